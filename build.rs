@@ -1,5 +1,5 @@
-//! Finds Embree, binds it and compiles the shim; a missing package ends the build with its name. On docs.rs, which has neither Embree nor
-//! libclang, checked-in bindings serve.
+//! Finds Embree, binds it and compiles the shim; a missing package ends the build with its name. On docs.rs, which has
+//! neither Embree nor libclang, checked-in bindings serve.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,8 @@ fn build() -> Result<(), String> {
     // EMBREE_DIR names the prefix of an Embree outside the system's directories.
     let own = env::var_os("EMBREE_DIR").map(PathBuf::from);
     let prefixes: Vec<PathBuf> = own.iter().cloned().chain(["/usr".into(), "/usr/local".into()]).collect();
-    let (prefix, version) = find_embree(&prefixes).ok_or("Embree's headers are missing; on Debian: apt install libembree-dev")?;
+    let (prefix, version) =
+        find_embree(&prefixes).ok_or("Embree's headers are missing; on Debian: apt install libembree-dev")?;
     let include = format!("-I{}", prefix.join("include").display());
     let define = format!("-DSTERADIAN_EMBREE={version}");
 
@@ -37,7 +38,9 @@ fn build() -> Result<(), String> {
         .opt_level(2)
         .flag_if_supported("-fno-plt")
         .try_compile("steradian_embree_shim")
-        .map_err(|error| format!("the C shim does not compile; on Debian: apt install build-essential ({})", one_line(&error)))?;
+        .map_err(|error| {
+            format!("the C shim does not compile; on Debian: apt install build-essential ({})", one_line(&error))
+        })?;
 
     cc::Build::new()
         .cpp(true)
@@ -45,7 +48,9 @@ fn build() -> Result<(), String> {
         .std("c++17")
         .opt_level(2)
         .try_compile("steradian_uncaught")
-        .map_err(|error| format!("the C++ part does not compile; on Debian: apt install build-essential ({})", one_line(&error)))?;
+        .map_err(|error| {
+            format!("the C++ part does not compile; on Debian: apt install build-essential ({})", one_line(&error))
+        })?;
 
     if own.is_some_and(|own| own == prefix) {
         println!("cargo::rustc-link-search=native={}", prefix.join("lib").display());
@@ -54,7 +59,8 @@ fn build() -> Result<(), String> {
     Ok(())
 }
 
-/// Enough for documentation, which is never linked. `ffi/embree_docs.rs` is what [`bind`] writes with Embree 3, without the checks of layouts.
+/// Enough for documentation, which is never linked. `ffi/embree_docs.rs` is what [`bind`] writes with Embree 3, without
+/// the checks of layouts.
 fn use_checked_in_bindings() -> Result<(), String> {
     let file = "ffi/embree_docs.rs";
     std::fs::copy(file, bindings_file()?).map(drop).map_err(|error| format!("cannot copy {file}: {error}"))
@@ -84,7 +90,9 @@ fn look_for_instructions() {
 /// The first prefix with Embree's headers, and the major version found there.
 fn find_embree(prefixes: &[PathBuf]) -> Option<(&Path, u32)> {
     let has = |prefix: &Path, version: u32| prefix.join(format!("include/embree{version}/rtcore.h")).is_file();
-    prefixes.iter().find_map(|prefix| EMBREE_VERSIONS.into_iter().find(|&v| has(prefix, v)).map(|v| (prefix.as_path(), v)))
+    prefixes
+        .iter()
+        .find_map(|prefix| EMBREE_VERSIONS.into_iter().find(|&v| has(prefix, v)).map(|v| (prefix.as_path(), v)))
 }
 
 /// Writes `embree.rs` into the output directory.
@@ -93,8 +101,13 @@ fn bind(arguments: &[&str]) -> Result<(), String> {
         .header("ffi/wrapper.h")
         .clang_args(arguments)
         .allowlist_function("st_.*|rtc(New|Release)(Device|Scene|Geometry)|rtc(Get|Set)Device.*")
-        .allowlist_function("rtcSet(SharedGeometryBuffer|Geometry(InstancedScene|Transform|TimeStepCount|BuildQuality|UserPrimitiveCount))")
-        .allowlist_function("rtcSetScene(Flags|BuildQuality)|rtcCommit(Geometry|Scene)|rtcAttachGeometryByID|rtcGetSceneBounds")
+        .allowlist_function(
+            "rtcSet(SharedGeometryBuffer|Geometry(InstancedScene|Transform|TimeStepCount|BuildQuality|\
+             UserPrimitiveCount))",
+        )
+        .allowlist_function(
+            "rtcSetScene(Flags|BuildQuality)|rtcCommit(Geometry|Scene)|rtcAttachGeometryByID|rtcGetSceneBounds",
+        )
         .allowlist_var("RTC_VERSION_MAJOR")
         .prepend_enum_name(false)
         .generate_comments(false)

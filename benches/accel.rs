@@ -21,7 +21,12 @@ const ACCELERATORS: [&str; 6] = ["embree", "bvh", "bvh:binary", "kdtree", "kdtre
 /// Rays that the linear oracle answers too.
 const ORACLE_RAYS: usize = 64;
 
-fn agree(model: &Model, set: &RaySet, accels: &[(AccelKind, Box<dyn Accelerator + '_>)], others: &[(&str, Box<dyn Other>)]) {
+fn agree(
+    model: &Model,
+    set: &RaySet,
+    accels: &[(AccelKind, Box<dyn Accelerator + '_>)],
+    others: &[(&str, Box<dyn Other>)],
+) {
     let linear = accel::build(AccelKind::Linear, &model.geometry, 1).expect("builds");
     let (_, reference) = accels.iter().find(|(kind, _)| kind.to_string() == "bvh").expect("in the list");
     for ray in set.rays.iter().step_by((set.rays.len() / ORACLE_RAYS).max(1)) {
@@ -52,15 +57,23 @@ fn agree(model: &Model, set: &RaySet, accels: &[(AccelKind, Box<dyn Accelerator 
         let count = set.rays.len();
         assert!(different * 100 <= count, "{name}: {different} of {count} answers differ");
         println!(
-            "{}, {}: {name} differs on {different} of {count} rays and finds the surface again that they leave on {again}",
+            "{}, {}: {name} differs on {different} of {count} rays and finds the surface again that they leave on \
+             {again}",
             model.name, set.name
         );
     }
 }
 
-fn time(group: &mut BenchmarkGroup<WallTime>, name: &str, set: &RaySet, closest: impl Fn(&steradian::math::Ray) -> bool) {
+fn time(
+    group: &mut BenchmarkGroup<WallTime>,
+    name: &str,
+    set: &RaySet,
+    closest: impl Fn(&steradian::math::Ray) -> bool,
+) {
     group.throughput(Throughput::Elements(set.rays.len() as u64));
-    group.bench_function(name, |bencher| bencher.iter(|| black_box(&set.rays).iter().filter(|ray| closest(ray)).count()));
+    group.bench_function(name, |bencher| {
+        bencher.iter(|| black_box(&set.rays).iter().filter(|ray| closest(ray)).count());
+    });
 }
 
 fn queries(criterion: &mut Criterion) {
@@ -71,8 +84,10 @@ fn queries(criterion: &mut Criterion) {
             .map(|name| name.parse::<AccelKind>().expect("a name"))
             .map(|kind| (kind, accel::build(kind, geometry, 0).expect("builds")))
             .collect();
-        let others: Vec<(&str, Box<dyn Other>)> =
-            vec![("crate bvh", Box::new(BvhCrate::new(model.mesh()))), ("crate obvhs", Box::new(ObvhsCrate::new(model.mesh())))];
+        let others: Vec<(&str, Box<dyn Other>)> = vec![
+            ("crate bvh", Box::new(BvhCrate::new(model.mesh()))),
+            ("crate obvhs", Box::new(ObvhsCrate::new(model.mesh()))),
+        ];
         for set in ray_sets(&model, &*accels[0].1, RESOLUTION) {
             agree(&model, &set, &accels, &others);
             let mut group = criterion.benchmark_group(format!("{}/{}", model.name, set.name));
@@ -80,7 +95,9 @@ fn queries(criterion: &mut Criterion) {
             group.warm_up_time(Duration::from_millis(100)).measurement_time(Duration::from_millis(600));
             for (kind, accel) in &accels {
                 let any = set.any;
-                time(&mut group, &kind.to_string(), &set, |ray| if any { accel.occluded(ray) } else { accel.intersect(ray).is_some() });
+                time(&mut group, &kind.to_string(), &set, |ray| {
+                    if any { accel.occluded(ray) } else { accel.intersect(ray).is_some() }
+                });
             }
             let (blocks, mut hits, mut occluded) = (RayRows::blocks(&set.rays), HitRows::default(), [false; BATCH]);
             group.bench_function("embree in batches", |bencher| {

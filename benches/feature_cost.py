@@ -63,10 +63,11 @@ FEATURES = {
     "textures": (
         "`Material::Constant`; `Features::filtered_textures`",
         [
-            ("src/scene.rs", r"place\.insert\(self\.met_material\(at, direction\)\.bsdf\(&self\.textures, footprint\)\)", "{ let _ = (direction, footprint, place); " + NEVER + " }"),
+            ("src/scene.rs", r"Cow::Owned\(material\.bsdf\(&self\.textures, footprint\)\)", "{ let _ = footprint; " + NEVER + " }"),
             ("src/light/area/mod.rs", r"Some\(id\) => self\.textured\(&textures\[id\.index\(\)\], &point\(\)\),", "Some(_) => { let _ = (textures, point); " + NEVER + " }"),
-            ("src/integrator/path/materials.rs", r"Material::Textured\(textured\) => \{", "Material::Textured(_) if false => {}\n            Material::Textured(textured) => {\n                if true { " + NEVER + " }"),
-            ("src/integrator/cones.rs", r"= self\.pixel_footprint\?;", "= None::<PixelFootprint>?;"),
+            ("src/integrator/path/materials.rs", r"Material::Textured\(\.\.\) => vertices\.textured\.push\(lane as u8\),", "Material::Textured(..) => " + NEVER + ","),
+            ("src/integrator/path/materials.rs", r"0\.\.vertices\.textured\.len\(\)", "0..0"),
+            ("src/integrator/render_context.rs", r"= self\.cone_share\?;", "= None::<f32>?;"),
             ("src/integrator/path/wave.rs", r"cones\.get\(path\)", "None::<&RayCone>"),
         ],
     ),
@@ -129,7 +130,7 @@ FEATURES = {
             ("src/film/tile.rs", r"self\.layout\.beside_color\(\)", "false"),
         ],
     ),
-    "variance": ("`FilmTile::wants_groups`", [("src/film/tile.rs", r"!self\.spread\.is_empty\(\)", "false")]),
+    "variance": ("`FilmTile::tracks_variance`", [("src/film/tile.rs", r"self\.moments\.is_some\(\)", "false")]),
     "filters with negative lobes": ("the filter's weight", [("src/film/tile.rs", r"self\.layout\.signed", "false")]),
     "clamping": ("the clamp of `path`", [("src/integrator/path/mod.rs", r"self\.clamp == f32::INFINITY \|\|", "true ||")]),
 }

@@ -8,7 +8,9 @@ use std::time::{Duration, Instant};
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use steradian::accel::{self, AccelKind, Accelerator};
-use steradian::geometry::{Analytic, Disk, Frustum, Geometry, Hit, Profile, Quad, Revolution, Shape, Sphere, TransformedShape};
+use steradian::geometry::{
+    Analytic, Disk, Frustum, Geometry, Hit, Profile, Quad, Revolution, Shape, Sphere, TransformedShape,
+};
 use steradian::id::{PrimId, ShapeId};
 use steradian::math::{DVec3, Ray, Rng, Transform, Vec3};
 use steradian_benches::models::tessellated_sphere;
@@ -61,8 +63,12 @@ fn shape_tests(criterion: &mut Criterion) {
         let mut group = criterion.benchmark_group(format!("shapes/{name}"));
         group.sample_size(20).warm_up_time(Duration::from_millis(200)).measurement_time(Duration::from_millis(1000));
         group.throughput(Throughput::Elements(RAYS as u64));
-        group.bench_function("test alone", |b| b.iter(|| black_box(&rays).iter().filter(|ray| direct(ray).is_some()).count()));
-        group.bench_function("embree", |b| b.iter(|| black_box(&rays).iter().filter(|ray| embree.intersect(ray).is_some()).count()));
+        group.bench_function("test alone", |b| {
+            b.iter(|| black_box(&rays).iter().filter(|ray| direct(ray).is_some()).count());
+        });
+        group.bench_function("embree", |b| {
+            b.iter(|| black_box(&rays).iter().filter(|ray| embree.intersect(ray).is_some()).count());
+        });
         if name == "sphere" {
             for cells in [4, 16, 64] {
                 let mesh = tessellated_sphere(cells);
@@ -72,7 +78,8 @@ fn shape_tests(criterion: &mut Criterion) {
                 let found = count(&*accel);
                 assert!(found <= hits && found * 100 > hits * (99 - 80 / cells as usize), "{found} of {hits}");
                 let triangles = mesh.shapes[0].prim_count();
-                group.bench_function(format!("embree, {triangles} triangles"), |b| b.iter(|| count(black_box(&*accel))));
+                group
+                    .bench_function(format!("embree, {triangles} triangles"), |b| b.iter(|| count(black_box(&*accel))));
             }
         }
         group.finish();
@@ -104,12 +111,16 @@ fn nanoseconds(shape: &TransformedShape, rays: &[Ray]) -> f64 {
 
 /// Rays from afar that hit and that pass through the bounds without, level rays, rays along the axis.
 fn kinds_of_rays(geometry: &Geometry, shape: &TransformedShape) -> Vec<(&'static str, Vec<Ray>)> {
-    let (hits, misses): (Vec<Ray>, Vec<Ray>) = rays(geometry).into_iter().partition(|ray| shape.intersect(ray).is_some());
+    let (hits, misses): (Vec<Ray>, Vec<Ray>) =
+        rays(geometry).into_iter().partition(|ray| shape.intersect(ray).is_some());
     let mut random = Rng::new(4);
     let mut through = |direction: fn(DVec3) -> DVec3| -> Vec<Ray> {
         let mut ray = |_| {
             let d = direction(random.direction()).normalize();
-            Ray::new((shape.shape.sample([random.unit(), random.unit()]).p + 0.05 * random.cube() - 3.0 * d).as_vec3(), d.as_vec3())
+            Ray::new(
+                (shape.shape.sample([random.unit(), random.unit()]).p + 0.05 * random.cube() - 3.0 * d).as_vec3(),
+                d.as_vec3(),
+            )
         };
         (0..4_096).map(&mut ray).collect()
     };

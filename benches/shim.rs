@@ -97,7 +97,8 @@ fn trace(file: &Path, passes: usize) -> Result<(), Box<dyn Error>> {
     let mut words = Words(Box::new(io::BufReader::new(fs::File::open(file)?)));
     let [vertices, triangles, sets] = [words.index()?, words.index()?, words.index()?];
     let positions = (0..vertices).map(|_| Ok(words.vector()?.to_array())).collect::<io::Result<_>>()?;
-    let triangles = (0..triangles).map(|_| Ok([words.index()?, words.index()?, words.index()?])).collect::<io::Result<_>>()?;
+    let triangles =
+        (0..triangles).map(|_| Ok([words.index()?, words.index()?, words.index()?])).collect::<io::Result<_>>()?;
     let shape = Shape::Mesh(Mesh::new(positions, triangles, None, None)?);
     let geometry = Geometry { shapes: vec![shape], world: vec![ShapeId(0)], ..Geometry::default() };
     let accel = EmbreeAccel::new(&geometry, 1)?;
@@ -130,14 +131,17 @@ const QUERIES: [(&str, Query); 6] = [
 const BLOCK: usize = 1024;
 
 fn measure(accel: &dyn Accelerator, name: &str, rays: &[Ray], passes: usize) {
-    let mut found = Found { hits: vec![HitRows::default(); BLOCK / BATCH], occluded: vec![[false; BATCH]; BLOCK / BATCH] };
+    let mut found =
+        Found { hits: vec![HitRows::default(); BLOCK / BATCH], occluded: vec![[false; BATCH]; BLOCK / BATCH] };
     let rows: Vec<RayRows> = rays.chunks(BATCH).map(RayRows::of).collect();
     let mut best = vec![[f64::INFINITY; QUERIES.len()]; rays.len() / BLOCK];
     let mut answers = [Answer::default(); QUERIES.len()];
     for pass in 0..=passes {
         answers = Default::default();
         for (i, (_, query)) in QUERIES.iter().enumerate() {
-            for (((block, rays), rows), best) in rays.chunks(BLOCK).enumerate().zip(rows.chunks(BLOCK / BATCH)).zip(&mut best) {
+            for (((block, rays), rows), best) in
+                rays.chunks(BLOCK).enumerate().zip(rows.chunks(BLOCK / BATCH)).zip(&mut best)
+            {
                 let (first, answer) = (block * BLOCK, &mut answers[i]);
                 let start = Instant::now();
                 run(*query, black_box(accel), (rays, rows), first, &mut found, answer);
@@ -187,7 +191,14 @@ struct Found {
 /// Traces a block of rays from number `first` on: hits of single rays are taken into the answer at once, those of
 /// batches go to `found`.
 #[inline(never)]
-fn run(query: Query, accel: &dyn Accelerator, (rays, rows): (&[Ray], &[RayRows]), first: usize, found: &mut Found, answer: &mut Answer) {
+fn run(
+    query: Query,
+    accel: &dyn Accelerator,
+    (rays, rows): (&[Ray], &[RayRows]),
+    first: usize,
+    found: &mut Found,
+    answer: &mut Answer,
+) {
     match query {
         Query::Closest(None) => {
             for (i, ray) in rays.iter().enumerate() {
@@ -204,10 +215,14 @@ fn run(query: Query, accel: &dyn Accelerator, (rays, rows): (&[Ray], &[RayRows])
             }
         }
         Query::Closest(Some(coherence)) => {
-            rows.iter().zip(&mut found.hits).for_each(|(rows, hits)| accel.intersect_rows(rows, BATCH, hits, coherence));
+            rows.iter()
+                .zip(&mut found.hits)
+                .for_each(|(rows, hits)| accel.intersect_rows(rows, BATCH, hits, coherence));
         }
         Query::Any(Some(coherence)) => {
-            rows.iter().zip(&mut found.occluded).for_each(|(rows, occluded)| accel.occluded_rows(rows, BATCH, occluded, coherence));
+            rows.iter()
+                .zip(&mut found.occluded)
+                .for_each(|(rows, occluded)| accel.occluded_rows(rows, BATCH, occluded, coherence));
         }
     }
 }

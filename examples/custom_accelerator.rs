@@ -1,4 +1,5 @@
-//! An accelerator of one's own: a wrapper that counts the rays of a render. `cargo run --release --example custom_accelerator -- scenes/cornell.json`.
+//! An accelerator of one's own: a wrapper that counts the rays of a render.
+//! `cargo run --release --example custom_accelerator -- scenes/cornell.json`.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -10,8 +11,8 @@ use steradian::import::{self, ImportOptions};
 use steradian::math::{Aabb, Ray};
 use steradian::render::{self, Overrides, Settings, Silent};
 
-/// Passes every ray to another accelerator. A new structure implements the same methods over a [`steradian::geometry::Geometry`]; see
-/// [`accel::LinearAccel`] for the shortest one.
+/// Passes every ray to another accelerator. A new structure implements the same methods over a
+/// [`steradian::geometry::Geometry`]; see [`accel::LinearAccel`] for the shortest one.
 struct Counting<'g> {
     inner: Box<dyn Accelerator + 'g>,
     closest: AtomicU64,
@@ -55,6 +56,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let counting = Counting { inner, closest: AtomicU64::new(0), any: AtomicU64::new(0) };
     render::render(&scene, &counting, &settings, &Silent, &AtomicBool::new(false))?;
     let count = |of: &AtomicU64| of.load(Ordering::Relaxed);
-    println!("{}: {} closest-hit rays, {} shadow rays", counting.description(), count(&counting.closest), count(&counting.any));
+    println!(
+        "{}: {} closest-hit rays, {} shadow rays",
+        counting.description(),
+        count(&counting.closest),
+        count(&counting.any)
+    );
     Ok(())
 }

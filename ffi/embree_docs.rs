@@ -167,7 +167,9 @@ pub const RTC_ERROR_UNSUPPORTED_CPU: RTCError = 5;
 pub const RTC_ERROR_CANCELLED: RTCError = 6;
 pub type RTCError = ::std::os::raw::c_uint;
 pub type RTCErrorFunction =
-    ::std::option::Option<unsafe extern "C" fn(userPtr: *mut ::std::os::raw::c_void, code: RTCError, str_: *const ::std::os::raw::c_char)>;
+    ::std::option::Option<unsafe extern "C" fn(
+        userPtr: *mut ::std::os::raw::c_void, code: RTCError, str_: *const ::std::os::raw::c_char
+    )>;
 pub type RTCMemoryMonitorFunction =
     ::std::option::Option<unsafe extern "C" fn(ptr: *mut ::std::os::raw::c_void, bytes: isize, post: bool) -> bool>;
 pub const RTC_BUFFER_TYPE_INDEX: RTCBufferType = 0;
@@ -360,9 +362,13 @@ pub struct StHit {
     pub instance: u32,
 }
 pub type StIntersect =
-    ::std::option::Option<unsafe extern "C" fn(shape: *const ::std::os::raw::c_void, ray: *const StRay, key: u32, instance: u32) -> f32>;
+    ::std::option::Option<unsafe extern "C" fn(
+        shape: *const ::std::os::raw::c_void, ray: *const StRay, key: u32, instance: u32
+    ) -> f32>;
 pub type StIntersectPacket = ::std::option::Option<
-    unsafe extern "C" fn(shape: *const ::std::os::raw::c_void, rays: *const f32, n: u32, valid: *const ::std::os::raw::c_int, t: *mut f32),
+    unsafe extern "C" fn(
+        shape: *const ::std::os::raw::c_void, rays: *const f32, n: u32, valid: *const ::std::os::raw::c_int, t: *mut f32
+    ),
 >;
 pub type StCounts = ::std::option::Option<
     unsafe extern "C" fn(user: *const ::std::os::raw::c_void, ray: *const StRay, key: u32, hit: *const StHit) -> bool,
@@ -386,7 +392,9 @@ impl Default for StUserShape {
     }
 }
 pub type StEnter =
-    ::std::option::Option<unsafe extern "C" fn(instance: *const ::std::os::raw::c_void, ray: *const StRay, inside: *mut StRay) -> bool>;
+    ::std::option::Option<unsafe extern "C" fn(
+        instance: *const ::std::os::raw::c_void, ray: *const StRay, inside: *mut StRay
+    ) -> bool>;
 #[repr(C)]
 #[derive(Debug, Copy, Clone)]
 pub struct StEnteredInstance {
@@ -435,7 +443,9 @@ impl Default for StQuery {
         }
     }
 }
-pub type StUncaught = ::std::option::Option<unsafe extern "C" fn(out_of_memory: bool, what: *const ::std::os::raw::c_char)>;
+pub type StUncaught = ::std::option::Option<unsafe extern "C" fn(
+    out_of_memory: bool, what: *const ::std::os::raw::c_char
+)>;
 unsafe extern "C" {
     pub fn rtcNewDevice(config: *const ::std::os::raw::c_char) -> RTCDevice;
     pub fn rtcReleaseDevice(device: RTCDevice);

@@ -28,8 +28,8 @@ static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| {
 /// Reads the bytes as a file of `kind`.
 ///
 /// # Panics
-/// If that takes more memory than such a file explains. Images are compressed and have a limit of their own, a number of pixels; and
-/// subdivision surfaces have no bound on their triangles.
+/// If that takes more memory than such a file explains. Images are compressed and have a limit of their own, a number
+/// of pixels; and subdivision surfaces have no bound on their triangles.
 pub fn run(kind: &str, data: &[u8]) {
     LazyLock::force(&FOLDER);
     ALLOCATOR.reset_peak_usage();
@@ -40,7 +40,8 @@ pub fn run(kind: &str, data: &[u8]) {
     assert!(asks_for_more || taken <= FREE + FACTOR * data.len(), "{taken} bytes for a file of {}", data.len());
 }
 
-/// Whether a count is more than a few, as levels of subdivision go: a million triangles take their time, which is no finding.
+/// Whether a count is more than a few, as levels of subdivision go: a million triangles take their time, which is no
+/// finding.
 fn asks_for_many(rest: &[u8]) -> bool {
     let digits = rest.iter().skip_while(|c| !c.is_ascii_digit()).take_while(|c| c.is_ascii_digit());
     digits.fold(0u64, |n, c| n.saturating_mul(10).saturating_add(u64::from(c - b'0'))) > 4

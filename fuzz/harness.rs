@@ -1,5 +1,5 @@
-//! What is done with bytes that claim to be a file: they are read as one, and what comes out is looked at. Used by the fuzz targets and by
-//! the test that replays their corpus.
+//! What is done with bytes that claim to be a file: they are read as one, and what comes out is looked at. Used by the
+//! fuzz targets and by the test that replays their corpus.
 
 use std::collections::HashSet;
 use std::os::unix::fs::MetadataExt;
@@ -11,7 +11,8 @@ use steradian::config::{self, Trust};
 use steradian::import::{self, ImportOptions};
 use steradian::render::RenderProvenance;
 
-/// Reads `data` as a file of `kind`, which is the name of a target, in `folder`, which only this caller writes to. Malformed files are errors; anything else is a finding.
+/// Reads `data` as a file of `kind`, which is the name of a target, in `folder`, which only this caller writes to.
+/// Malformed files are errors; anything else is a finding.
 pub fn read(kind: &str, data: &[u8], folder: &Path) {
     let write = |name: &str, data: &[u8]| {
         let path = folder.join(name);
@@ -55,7 +56,9 @@ pub fn read(kind: &str, data: &[u8], folder: &Path) {
         }
         "recipe" => {
             let file = Path::new("a.exr");
-            if let Some(recipe) = serde_json::from_slice(data).ok().and_then(|value| RenderProvenance::from_value(value, file).ok()) {
+            if let Some(recipe) =
+                serde_json::from_slice(data).ok().and_then(|value| RenderProvenance::from_value(value, file).ok())
+            {
                 let value = recipe.to_value();
                 let again = RenderProvenance::from_value(value.clone(), file).expect("what was taken is taken again");
                 assert_eq!(again.to_value(), value);

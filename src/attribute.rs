@@ -69,8 +69,12 @@ impl AttributeValues {
     #[must_use]
     pub fn gathered(&self, indices: impl Iterator<Item = u32>) -> Self {
         match self {
-            Self::Numbers(values) => Self::Numbers(indices.map(|i| values.get(i as usize).copied().unwrap_or_default()).collect()),
-            Self::Colors(values) => Self::Colors(indices.map(|i| values.get(i as usize).copied().unwrap_or_default()).collect()),
+            Self::Numbers(values) => {
+                Self::Numbers(indices.map(|i| values.get(i as usize).copied().unwrap_or_default()).collect())
+            }
+            Self::Colors(values) => {
+                Self::Colors(indices.map(|i| values.get(i as usize).copied().unwrap_or_default()).collect())
+            }
         }
     }
 
@@ -80,7 +84,9 @@ impl AttributeValues {
             (Self::Numbers(values), Self::Numbers(mut others)) => values.append(&mut others),
             (Self::Colors(values), Self::Colors(mut others)) => values.append(&mut others),
             (_, other) => {
-                *self = Self::Colors((0..self.len()).map(|i| self.get(i)).chain((0..other.len()).map(|i| other.get(i))).collect());
+                *self = Self::Colors(
+                    (0..self.len()).map(|i| self.get(i)).chain((0..other.len()).map(|i| other.get(i))).collect(),
+                );
             }
         }
     }
@@ -131,10 +137,19 @@ mod tests {
     #[test]
     fn values_stand_between_those_of_vertices_and_are_constant_on_faces() {
         let attributes = [
-            Attribute { id: AttributeId(4), of_faces: false, values: AttributeValues::Numbers(vec![0.0, 9.0, 1.0, 2.0]) },
-            Attribute { id: AttributeId(7), of_faces: true, values: AttributeValues::Colors(vec![[0.0; 3], [0.25, 0.5, 3.0]]) },
+            Attribute {
+                id: AttributeId(4),
+                of_faces: false,
+                values: AttributeValues::Numbers(vec![0.0, 9.0, 1.0, 2.0]),
+            },
+            Attribute {
+                id: AttributeId(7),
+                of_faces: true,
+                values: AttributeValues::Colors(vec![[0.0; 3], [0.25, 0.5, 3.0]]),
+            },
         ];
-        let point = AttributePoint { attributes: &attributes, prim: PrimId(1), corners: [0, 2, 3], weights: [0.5, 0.25, 0.25] };
+        let point =
+            AttributePoint { attributes: &attributes, prim: PrimId(1), corners: [0, 2, 3], weights: [0.5, 0.25, 0.25] };
         assert_eq!(point.value(AttributeId(4)), Some([0.75; 3]));
         assert_eq!(point.value(AttributeId(7)), Some([0.25, 0.5, 3.0]));
         assert_eq!(point.value(AttributeId(5)), None);

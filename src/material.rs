@@ -7,8 +7,8 @@ pub use inputs::{AlphaInput, CoatInput, ColorInput, Facets, PlasticCoat, RangedI
 pub use principled::PrincipledInputs;
 
 use crate::bsdf::{
-    Beckmann, Bsdf, BsdfFlags, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Phong, Plastic, Principled,
-    SeparableGgx, SingleScatteringBsdf, ThinDielectric,
+    Beckmann, Bsdf, BsdfFlags, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Phong,
+    Plastic, Principled, SeparableGgx, SingleScatteringBsdf, ThinDielectric,
 };
 use crate::color::Rgb;
 use crate::id::{MaterialId, TextureId};
@@ -145,8 +145,12 @@ impl Facets {
         match self {
             Self::Ggx => Bsdf::Conductor(metal.with_surface(alpha, tint)),
             Self::SingleGgx => Bsdf::Conductor(metal.with_surface(alpha, tint).single_scattering()),
-            Self::SeparableGgx => Bsdf::SeparableGgx(SingleScatteringBsdf::Conductor(metal.with_facets(SeparableGgx::new(alpha), tint))),
-            Self::Beckmann => Bsdf::Beckmann(SingleScatteringBsdf::Conductor(metal.with_facets(Beckmann::new(alpha), tint))),
+            Self::SeparableGgx => {
+                Bsdf::SeparableGgx(SingleScatteringBsdf::Conductor(metal.with_facets(SeparableGgx::new(alpha), tint)))
+            }
+            Self::Beckmann => {
+                Bsdf::Beckmann(SingleScatteringBsdf::Conductor(metal.with_facets(Beckmann::new(alpha), tint)))
+            }
         }
     }
 
@@ -154,7 +158,9 @@ impl Facets {
     fn dielectric(self, ior: f32, alpha: [f32; 2], [reflection, transmission]: [Rgb; 2]) -> Bsdf {
         match self {
             Self::Ggx => Bsdf::Dielectric(Dielectric::new(ior, alpha).tinted(reflection, transmission)),
-            Self::SingleGgx => Bsdf::Dielectric(Dielectric::new(ior, alpha).single_scattering().tinted(reflection, transmission)),
+            Self::SingleGgx => {
+                Bsdf::Dielectric(Dielectric::new(ior, alpha).single_scattering().tinted(reflection, transmission))
+            }
             Self::SeparableGgx => {
                 let glass = Dielectric::with_facets(ior, alpha, SeparableGgx::new).tinted(reflection, transmission);
                 Bsdf::SeparableGgx(SingleScatteringBsdf::Dielectric(glass))
@@ -167,18 +173,26 @@ impl Facets {
     }
 }
 
+/// What exceeds 1 together with `specular` is taken from `diffuse`.
+#[inline]
+fn limited(diffuse: Rgb, specular: Rgb) -> Rgb {
+    let left = Rgb::WHITE - specular;
+    Rgb::new(diffuse.r.min(left.r), diffuse.g.min(left.g), diffuse.b.min(left.b))
+}
+
 impl TexturedMaterial {
     /// The scattering over `footprint`.
     pub fn bsdf(&self, textures: &[Texture], footprint: &Footprint) -> Bsdf {
         match self {
-            Self::Diffuse { albedo, roughness } => match (albedo.at(textures, footprint), roughness.at(textures, footprint)) {
-                (albedo, 0.0) => Bsdf::Lambert(Lambert { albedo }),
-                (albedo, roughness) => Bsdf::Eon(Eon { albedo, roughness }),
-            },
-            Self::DiffuseTransmission { reflectance, transmittance } => Bsdf::DiffuseTransmission(DiffuseTransmission::new(
-                reflectance.at(textures, footprint),
-                transmittance.at(textures, footprint),
-            )),
+            Self::Diffuse { albedo, roughness } => {
+                match (albedo.at(textures, footprint), roughness.at(textures, footprint)) {
+                    (albedo, 0.0) => Bsdf::Lambert(Lambert { albedo }),
+                    (albedo, roughness) => Bsdf::Eon(Eon { albedo, roughness }),
+                }
+            }
+            Self::DiffuseTransmission { reflectance, transmittance } => Bsdf::DiffuseTransmission(
+                DiffuseTransmission::new(reflectance.at(textures, footprint), transmittance.at(textures, footprint)),
+            ),
             Self::Mirror { reflectance } => Bsdf::Mirror(Mirror { reflectance: reflectance.at(textures, footprint) }),
             Self::Conductor { metal, tint, alpha, facets } => {
                 facets.conductor(metal, alpha.at(textures, footprint), tint.at(textures, footprint))
@@ -187,11 +201,8 @@ impl TexturedMaterial {
                 facets.dielectric(*ior, alpha.at(textures, footprint), tints.map(|tint| tint.at(textures, footprint)))
             }
             Self::Phong { diffuse, specular, exponent, cosine } => {
-                // What exceeds 1 together is taken from the diffuse part.
                 let specular = specular.at(textures, footprint);
-                let diffuse = diffuse.at(textures, footprint);
-                let left = Rgb::WHITE - specular;
-                let diffuse = Rgb::new(diffuse.r.min(left.r), diffuse.g.min(left.g), diffuse.b.min(left.b));
+                let diffuse = limited(diffuse.at(textures, footprint), specular);
                 let exponent = exponent.at(textures, footprint);
                 if *cosine {
                     Bsdf::Phong(Phong::new(diffuse, specular, exponent))
@@ -212,7 +223,11 @@ impl TexturedMaterial {
             }
             Self::ThinDielectric { ior, tints } => {
                 let [reflection_tint, transmission_tint] = tints.map(|tint| tint.at(textures, footprint));
-                Bsdf::ThinDielectric(ThinDielectric { ior: ior.at(textures, footprint), reflection_tint, transmission_tint })
+                Bsdf::ThinDielectric(ThinDielectric {
+                    ior: ior.at(textures, footprint),
+                    reflection_tint,
+                    transmission_tint,
+                })
             }
             Self::Plastic { coat, albedo, tint, nonlinear } => {
                 let (albedo, tint) = (albedo.at(textures, footprint), tint.at(textures, footprint));
@@ -246,8 +261,12 @@ impl TexturedMaterial {
     fn textures(&self) -> Vec<TextureId> {
         let mut found = Vec::new();
         match self {
-            Self::Diffuse { albedo, roughness } => found.extend(albedo.texture().into_iter().chain(roughness.texture())),
-            Self::DiffuseTransmission { reflectance: a, transmittance: b } => found.extend(a.texture().into_iter().chain(b.texture())),
+            Self::Diffuse { albedo, roughness } => {
+                found.extend(albedo.texture().into_iter().chain(roughness.texture()));
+            }
+            Self::DiffuseTransmission { reflectance: a, transmittance: b } => {
+                found.extend(a.texture().into_iter().chain(b.texture()));
+            }
             Self::Phong { diffuse, specular, exponent, .. } => {
                 found.extend([diffuse.texture(), specular.texture(), exponent.texture()].into_iter().flatten());
             }
@@ -314,7 +333,12 @@ impl Material {
 
     /// The scattering over a footprint of a dielectric as a boundary with another relative index of refraction, inside
     /// over outside; `None` for all other materials.
-    pub fn boundary<'f>(&self, textures: &[Texture], footprint: impl FnOnce() -> Footprint<'f>, ior: f32) -> Option<Bsdf> {
+    pub fn boundary<'f>(
+        &self,
+        textures: &[Texture],
+        footprint: impl FnOnce() -> Footprint<'f>,
+        ior: f32,
+    ) -> Option<Bsdf> {
         match self {
             Self::Textured(textured, _) => match **textured {
                 TexturedMaterial::Dielectric { alpha, facets, tints, .. } => {
@@ -337,7 +361,9 @@ impl Material {
     ) -> Option<MaterialId> {
         match self {
             Self::Constant(_) | Self::Textured(..) => None,
-            Self::Mix { first, second, amount } => Some(if u() < amount.at(textures, &point()) { *second } else { *first }),
+            Self::Mix { first, second, amount } => {
+                Some(if u() < amount.at(textures, &point()) { *second } else { *first })
+            }
             Self::TwoSided { front, back } => Some(if is_front { *front } else { *back }),
         }
     }

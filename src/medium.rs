@@ -234,7 +234,8 @@ mod tests {
     fn what_is_there_does_not_depend_on_the_way() {
         // Every order of entering three media, one of them twice, and every order of leaving them.
         let all = [0, 1, 1, 2].map(MediumId);
-        let orders = || (0..256).map(|i| [i & 3, i >> 2 & 3, i >> 4 & 3, i >> 6 & 3]).filter(|o| (0..4).all(|k| o.contains(&k)));
+        let orders =
+            || (0..256).map(|i| [i & 3, i >> 2 & 3, i >> 4 & 3, i >> 6 & 3]).filter(|o| (0..4).all(|k| o.contains(&k)));
         let full = all.into_iter().fold(MediumStack::default(), MediumStack::pushed);
         assert_eq!(full.medium(), Some(MediumId(0)));
         for order in orders() {
@@ -277,6 +278,9 @@ mod tests {
         assert!(red < 1.728_28 && 1.728_28 < green && green < blue, "{red} {green} {blue}");
         // Measured (Schott): 1.7209 at 650 nm, 1.7342 at 550 nm, 1.7624 at 450 nm; Cauchy's law with two terms is not
         // exact.
-        assert!((red - 1.7209).abs() < 3e-3 && (green - 1.7342).abs() < 3e-3 && (blue - 1.7624).abs() < 8e-3, "{red} {green} {blue}");
+        assert!(
+            (red - 1.7209).abs() < 3e-3 && (green - 1.7342).abs() < 3e-3 && (blue - 1.7624).abs() < 8e-3,
+            "{red} {green} {blue}"
+        );
     }
 }

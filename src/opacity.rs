@@ -59,9 +59,10 @@ impl AlphaMask for Opacity {
             Solidity::Mixed => {}
         }
         let point = match shape {
-            Shape::Mesh(mesh) => {
-                Footprint { attributes: mesh.attributes_at(hit.prim, hit.u, hit.v), ..Footprint::point(mesh.uv(hit.prim, hit.u, hit.v)) }
-            }
+            Shape::Mesh(mesh) => Footprint {
+                attributes: mesh.attributes_at(hit.prim, hit.u, hit.v),
+                ..Footprint::point(mesh.uv(hit.prim, hit.u, hit.v))
+            },
             Shape::Analytic(placed) => match placed.interaction(ray, hit) {
                 Some(at) => Footprint::point(at.uv),
                 // A rounding artefact, which the integrator looks past.

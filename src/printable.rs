@@ -30,7 +30,8 @@ fn escape(text: &str, breaks_stay: bool) -> String {
 
 /// Control characters, ends of lines, and what turns the direction of writing.
 fn is_control(c: char) -> bool {
-    c.is_control() || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    c.is_control()
+        || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 #[cfg(test)]
@@ -43,7 +44,10 @@ mod tests {
         assert_eq!(lines("a\n\tb\u{7}\r"), "a\n\tb\\u0007\\r");
         for c in (0..0x3000).filter_map(char::from_u32) {
             let text = lines(&c.to_string());
-            assert!(text.chars().all(|c| "\n\t".contains(c) || !is_control(c)) && !line(&text).contains(['\n', '\t']), "{c:?}");
+            assert!(
+                text.chars().all(|c| "\n\t".contains(c) || !is_control(c)) && !line(&text).contains(['\n', '\t']),
+                "{c:?}"
+            );
         }
         // In JSON the same text is meant.
         let json = serde_json::json!({ "a": "\u{1b}\u{9b}\u{202e}" });

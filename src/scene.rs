@@ -126,17 +126,30 @@ impl Scene {
     /// A footprint at a point of a surface, with the attributes of the mesh there.
     #[inline]
     pub fn with_attributes<'a>(&'a self, at: &SurfaceInteraction, footprint: Footprint<'a>) -> Footprint<'a> {
-        if self.features.attributes { Footprint { attributes: self.geometry.attributes(at), ..footprint } } else { footprint }
+        if self.features.attributes {
+            Footprint { attributes: self.geometry.attributes(at), ..footprint }
+        } else {
+            footprint
+        }
     }
 
     /// The BSDF at a point for a ray that arrives in `direction` with `footprint`.
     #[inline(always)]
-    pub fn bsdf<'a, 'f>(&'a self, at: &SurfaceInteraction, direction: Vec3, footprint: impl FnOnce() -> Footprint<'f>) -> Cow<'a, Bsdf> {
+    pub fn bsdf<'a, 'f>(
+        &'a self,
+        at: &SurfaceInteraction,
+        direction: Vec3,
+        footprint: impl FnOnce() -> Footprint<'f>,
+    ) -> Cow<'a, Bsdf> {
         let mut material = self.material(at.shape);
         if material.parts().is_some() {
             material = self.met_material(at, direction);
         }
-        if let Material::Constant(bsdf) = material { Cow::Borrowed(bsdf) } else { Cow::Owned(material.bsdf(&self.textures, footprint)) }
+        if let Material::Constant(bsdf) = material {
+            Cow::Borrowed(bsdf)
+        } else {
+            Cow::Owned(material.bsdf(&self.textures, footprint))
+        }
     }
 
     /// The material that a ray meets at a point, of those that the shape's material consists of.
@@ -156,13 +169,21 @@ impl Scene {
             return surface.normal_perturbation;
         }
         let mut found = None;
-        self.descend(surface.material, at, direction, |id| found = self.part_normal_perturbations[id.index()].or(found));
+        self.descend(surface.material, at, direction, |id| {
+            found = self.part_normal_perturbations[id.index()].or(found);
+        });
         found
     }
 
     /// The part of a material that a ray meets, which consists of no others; `visit` learns of the parts on the way to
     /// it.
-    fn descend(&self, mut id: MaterialId, at: &SurfaceInteraction, direction: Vec3, mut visit: impl FnMut(MaterialId)) -> MaterialId {
+    fn descend(
+        &self,
+        mut id: MaterialId,
+        at: &SurfaceInteraction,
+        direction: Vec3,
+        mut visit: impl FnMut(MaterialId),
+    ) -> MaterialId {
         let is_front = direction.dot(at.n_g) < 0.0;
         loop {
             let material = &self.materials[id.index()];
@@ -178,7 +199,8 @@ impl Scene {
 /// A number in `[0, 1)` hashed from a point, a direction and a material: the choice between the parts of a mix is the
 /// same for any number of threads, and another for every sample of a pixel.
 fn choice(at: &SurfaceInteraction, direction: Vec3, id: MaterialId) -> f32 {
-    let words = at.p.to_array().map(f64::to_bits).into_iter().chain(direction.to_array().map(|x| u64::from(x.to_bits())));
+    let words =
+        at.p.to_array().map(f64::to_bits).into_iter().chain(direction.to_array().map(|x| u64::from(x.to_bits())));
     let hash = words.fold(hash64(u64::from(id.0)), |hash, word| hash64(hash ^ word));
     (hash >> 40) as f32 * (1.0 / 16_777_216.0)
 }

@@ -20,8 +20,10 @@ fn room() -> Value {
         "shapes": [
             { "type": "quad", "material": "floor", "origin": [-2, 0, -2], "edge_u": [0, 0, 4], "edge_v": [4, 0, 0] },
             { "type": "sphere", "material": "mirror", "radius": 0.6, "transform": [{ "translate": [0.3, 0.6, 0] }] },
-            { "type": "quad", "material": "floor", "origin": [-1.6, 3, -0.2], "edge_u": [0.6, 0, 0], "edge_v": [0, 0, 0.6],
-              "emission": { "radiance": [40, 36, 30] } }
+            {
+                "type": "quad", "material": "floor", "origin": [-1.6, 3, -0.2], "edge_u": [0.6, 0, 0],
+                "edge_v": [0, 0, 0.6], "emission": { "radiance": [40, 36, 30] }
+            }
         ]
     })
 }
@@ -42,7 +44,9 @@ fn colors(image: &Image) -> Vec<[f64; 3]> {
 }
 
 fn relative_error(reference: &[[f64; 3]], test: &[[f64; 3]]) -> f64 {
-    let of_pixel = |(r, t): (&[f64; 3], &[f64; 3])| (0..3).map(|k| (t[k] - r[k]).powi(2) / (r[k] * r[k] + 0.01)).sum::<f64>() / 3.0;
+    let of_pixel = |(r, t): (&[f64; 3], &[f64; 3])| {
+        (0..3).map(|k| (t[k] - r[k]).powi(2) / (r[k] * r[k] + 0.01)).sum::<f64>() / 3.0
+    };
     reference.iter().zip(test).map(of_pixel).sum::<f64>() / reference.len() as f64
 }
 
@@ -92,12 +96,17 @@ fn pictures_are_as_good_as_promised_with_fewer_samples_and_without_bias() {
 
     let spp = (samples / reference.len() as u64) as u32;
     let of_even = (0..4).map(|seed| relative_error(&reference, &even(spp, seed)) / 4.0).sum::<f64>();
-    assert!(of_even > 1.3 * errors, "{errors} with {spp} samples where they are needed, {of_even} with as many everywhere");
+    assert!(
+        of_even > 1.3 * errors,
+        "{errors} with {spp} samples where they are needed, {of_even} with as many everywhere"
+    );
 }
 
 #[test]
 fn the_picture_and_its_statistics_do_not_depend_on_threads() {
-    let run = |threads| render(&room(), &Overrides { target_error: Some(0.05), threads: Some(threads), ..Overrides::default() });
+    let run = |threads| {
+        render(&room(), &Overrides { target_error: Some(0.05), threads: Some(threads), ..Overrides::default() })
+    };
     let (a, b) = (run(1), run(3));
     assert_eq!(colors(&a.image), colors(&b.image));
     assert_eq!((a.stats.samples, a.stats.estimated_error), (b.stats.samples, b.stats.estimated_error));
@@ -110,7 +119,8 @@ fn layers_hold_variance_and_samples() {
     let mut scene = room();
     scene["sampler"] = json!({ "type": "independent", "spp": 16 });
     scene["outputs"] = json!([{ "file": "unused.exr", "layers": ["variance", "samples"] }]);
-    let renders: Vec<_> = (0..40).map(|seed| render(&scene, &Overrides { seed: Some(seed), ..Overrides::default() }).image).collect();
+    let renders: Vec<_> =
+        (0..40).map(|seed| render(&scene, &Overrides { seed: Some(seed), ..Overrides::default() }).image).collect();
     let pictures: Vec<_> = renders.iter().map(colors).collect();
     let (mut estimated, mut measured) = (0.0, 0.0);
     for pixel in 0..pictures[0].len() {
@@ -119,11 +129,13 @@ fn layers_hold_variance_and_samples() {
         // Relative, so that the brightest pixels do not decide alone.
         let scale = 1.0 / (mean * mean + 0.01);
         measured += scale * values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 39.0;
-        let layer = |image: &Image| f64::from(image.layer(LayerKind::Variance).unwrap().pixels().nth(pixel).unwrap()[1]);
+        let layer =
+            |image: &Image| f64::from(image.layer(LayerKind::Variance).unwrap().pixels().nth(pixel).unwrap()[1]);
         estimated += scale * renders.iter().map(layer).sum::<f64>() / 40.0;
     }
     assert!((estimated / measured - 1.0).abs() < 0.1, "{estimated} estimated, {measured} measured");
-    let samples = |image: &Image| image.layer(LayerKind::Samples).unwrap().pixels().map(|p| f64::from(p[0])).collect::<Vec<_>>();
+    let samples =
+        |image: &Image| image.layer(LayerKind::Samples).unwrap().pixels().map(|p| f64::from(p[0])).collect::<Vec<_>>();
     assert!(samples(&renders[0]).iter().all(|n| *n == 16.0));
 
     let result = {
@@ -142,14 +154,17 @@ fn limits_of_samples_time_and_crops_hold() {
     assert_eq!((limited.stats.samples, limited.stats.spp_done), (32 * 72 * 48, 32));
     assert!(limited.stats.estimated_error.unwrap() > 1e-9);
 
-    let stopped = render(&room(), &Overrides { target_error: Some(1e-9), time_limit: Some(0.05), ..Overrides::default() });
+    let stopped =
+        render(&room(), &Overrides { target_error: Some(1e-9), time_limit: Some(0.05), ..Overrides::default() });
     assert!(stopped.stats.time_limited && stopped.stats.samples >= 16 * 72 * 48);
 
-    let crop = render(&room(), &Overrides { target_error: Some(0.05), crop: Some([30, 17, 13, 9]), ..Overrides::default() });
+    let crop =
+        render(&room(), &Overrides { target_error: Some(0.05), crop: Some([30, 17, 13, 9]), ..Overrides::default() });
     assert!(crop.stats.samples >= 16 * 13 * 9 && colors(&crop.image).len() == 13 * 9);
 
     // One pixel has no neighbours.
-    let pixel = render(&room(), &Overrides { target_error: Some(0.05), crop: Some([30, 17, 1, 1]), ..Overrides::default() });
+    let pixel =
+        render(&room(), &Overrides { target_error: Some(0.05), crop: Some([30, 17, 1, 1]), ..Overrides::default() });
     assert!(pixel.stats.samples >= 16 && pixel.stats.estimated_error.is_some());
 
     // Nothing but black has no error.
@@ -166,14 +181,22 @@ fn yard() -> Value {
         "camera": { "position": [0, 1.6, 4], "look_at": [0, 0.4, 0], "vertical_fov_degrees": 40 },
         "film": {},
         "integrator": { "type": "path", "max_depth": 5 },
-        "textures": { "tiles": { "type": "checker", "color0": [0.8, 0.7, 0.6], "color1": [0.1, 0.2, 0.3], "scale": [6, 6] } },
-        "materials": { "tiled": { "type": "diffuse", "albedo": { "texture": "tiles" } }, "painted": { "type": "diffuse", "albedo": [0.6, 0.1, 0.1] } },
+        "textures": {
+            "tiles": { "type": "checker", "color0": [0.8, 0.7, 0.6], "color1": [0.1, 0.2, 0.3], "scale": [6, 6] }
+        },
+        "materials": {
+            "tiled": { "type": "diffuse", "albedo": { "texture": "tiles" } },
+            "painted": { "type": "diffuse", "albedo": [0.6, 0.1, 0.1] }
+        },
         "shapes": [
             { "type": "quad", "material": "tiled", "origin": [-3, 0, -3], "edge_u": [0, 0, 6], "edge_v": [6, 0, 0] },
             { "type": "sphere", "material": "painted", "radius": 0.6, "transform": [{ "translate": [0, 0.6, 0] }] }
         ],
         "lights": [
-            { "type": "directional", "direction": [-1, -1.5, -0.5], "irradiance": [3, 2.8, 2.5], "angular_diameter_degrees": 8 },
+            {
+                "type": "directional", "direction": [-1, -1.5, -0.5], "irradiance": [3, 2.8, 2.5],
+                "angular_diameter_degrees": 8
+            },
             { "type": "environment", "radiance": [0.2, 0.25, 0.3] }
         ]
     })
@@ -194,22 +217,24 @@ fn of_200_pictures_95_in_100_are_as_good_as_promised_with_every_filter() {
             let mut scene = scene.clone();
             scene["film"] = json!({ "width": 48, "height": 48, "filter": filter });
             let spp = Overrides { spp: Some(1024), ..Overrides::default() };
-            let others: Vec<_> =
-                (0..8).map(|i| colors(&render(&scene, &Overrides { seed: Some(10_000 + i), ..spp.clone() }).image)).collect();
+            let others: Vec<_> = (0..8)
+                .map(|i| colors(&render(&scene, &Overrides { seed: Some(10_000 + i), ..spp.clone() }).image))
+                .collect();
             let of_pixel = |i: usize| [0, 1, 2].map(|k| others.iter().map(|picture| picture[i][k]).sum::<f64>() / 8.0);
             let reference: Vec<_> = (0..others[0].len()).map(of_pixel).collect();
             // The error of a reference is that of one of its parts over their number.
             let own = others.iter().map(|picture| relative_error(&reference, picture)).sum::<f64>() / (8.0 * 7.0);
             let results: Vec<_> = (0..200).map(|seed| adaptive(&scene, target, seed)).collect();
-            let errors: Vec<f64> = results.iter().map(|result| relative_error(&reference, &colors(&result.image))).collect();
+            let errors: Vec<f64> =
+                results.iter().map(|result| relative_error(&reference, &colors(&result.image))).collect();
             let kept = errors.iter().filter(|error| **error <= target).count();
             let mean = |of: &dyn Fn(usize) -> f64| (0..200).map(of).sum::<f64>() / 200.0;
             let error = mean(&|i| errors[i]);
             let estimated = mean(&|i| results[i].stats.estimated_error.unwrap());
             let samples = mean(&|i| results[i].stats.samples as f64) / reference.len() as f64;
             let line = format!(
-                "{name}, {}: {kept} of 200 within {target}; mean error {error:.3e}, estimated {estimated:.3e}, {samples:.1} samples per pixel, \
-                 reference {own:.1e}",
+                "{name}, {}: {kept} of 200 within {target}; mean error {error:.3e}, estimated {estimated:.3e}, \
+                 {samples:.1} samples per pixel, reference {own:.1e}",
                 filter["type"]
             );
             eprintln!("{line}");

@@ -57,7 +57,10 @@ fn scene(integrator: &Value) -> Value {
         "shapes": [
             { "type": "quad", "material": "coats", "origin": [-3, -1, 3], "edge_u": [6, 0, 0], "edge_v": [0, 0, -6] },
             { "type": "sphere", "material": "sides", "transform": [{ "translate": [-1, 0, 0] }] },
-            { "type": "sphere", "material": "sides", "reverse_normal": true, "radius": 0.5, "transform": [{ "translate": [1, 0, 1] }] },
+            {
+                "type": "sphere", "material": "sides", "reverse_normal": true, "radius": 0.5,
+                "transform": [{ "translate": [1, 0, 1] }]
+            },
             { "type": "sphere", "material": "rest", "transform": [{ "translate": [1, 0, -1] }] }
         ],
         "lights": [

@@ -38,14 +38,34 @@ fn the_good_scene_compiles() {
 #[test]
 fn names_that_do_not_exist() {
     assert_faults(&[
-        ("shapes[0].material", json!("gold"), "shapes[0].material", "no material named \"gold\" (did you mean \"Gold\"?)"),
+        (
+            "shapes[0].material",
+            json!("gold"),
+            "shapes[0].material",
+            "no material named \"gold\" (did you mean \"Gold\"?)",
+        ),
         ("shapes[0].material", json!("wood"), "shapes[0].material", "no material named \"wood\""),
         ("materials.tiled.albedo.texture", json!("tile"), "materials.tiled.albedo", "did you mean \"tiles\"?"),
         ("materials.Gold.metal", json!("golt"), "materials.Gold.metal", "did you mean \"gold\"?"),
         ("instances[0].object", json!("pear"), "instances[0].object", "did you mean \"pair\"?"),
-        ("objects.pair.instances[1].object", json!("lmap"), "objects.pair.instances[1].object", "did you mean \"lamp\"?"),
-        ("objects.unused", json!({ "instances": [{ "object": "nothing" }] }), "objects.unused.instances[0].object", "\"nothing\""),
-        ("objects.lamp.shapes[0].material", json!("glas"), "objects.lamp.shapes[0].material", "did you mean \"glass\"?"),
+        (
+            "objects.pair.instances[1].object",
+            json!("lmap"),
+            "objects.pair.instances[1].object",
+            "did you mean \"lamp\"?",
+        ),
+        (
+            "objects.unused",
+            json!({ "instances": [{ "object": "nothing" }] }),
+            "objects.unused.instances[0].object",
+            "\"nothing\"",
+        ),
+        (
+            "objects.lamp.shapes[0].material",
+            json!("glas"),
+            "objects.lamp.shapes[0].material",
+            "did you mean \"glass\"?",
+        ),
     ]);
 }
 
@@ -56,14 +76,24 @@ fn unknown_keys_and_types() {
         ("shapes[0].raduis", json!(1), "shapes[0]", "did you mean `radius`?"),
         ("shapes[0].type", json!("shpere"), "shapes[0].type", "did you mean `sphere`?"),
         ("shapes[0].radius", json!("one"), "shapes[0].radius", "\"one\""),
-        ("shapes[0].transform[0]", json!({ "trnslate": [0, 0, 0] }), "shapes[0].transform[0]", "did you mean `translate`?"),
+        (
+            "shapes[0].transform[0]",
+            json!({ "trnslate": [0, 0, 0] }),
+            "shapes[0].transform[0]",
+            "did you mean `translate`?",
+        ),
         ("camera.lens.radus", json!(1), "camera.lens", "did you mean `radius`?"),
         ("film.filter.type", json!("gausian"), "film.filter.type", "did you mean `gaussian`?"),
         ("integrator.max_dept", json!(3), "integrator", "did you mean `max_depth`?"),
         ("integrator", json!({ "type": "normal", "max_depth": 3 }), "integrator", "max_depth"),
         ("lights[0].intensity", json!([1, 1]), "lights[0].intensity", "invalid length 2"),
         ("materials.Gold.type", json!("conductr"), "materials.Gold.type", "did you mean `conductor`?"),
-        ("materials.tiled.albedo", json!({ "texture": "tiles", "scale": 2 }), "materials.tiled.albedo.scale", "expected a colour"),
+        (
+            "materials.tiled.albedo",
+            json!({ "texture": "tiles", "scale": 2 }),
+            "materials.tiled.albedo.scale",
+            "expected a colour",
+        ),
         ("film.width", json!(-1), "film.width", "-1"),
         ("film.width", json!(10.5), "film.width", "10.5"),
     ]);
@@ -74,7 +104,12 @@ fn opacities() {
     assert_faults(&[
         ("shapes[0].opacity", json!(1.5), "shapes[0].opacity", "from 0 to 1, not 1.5"),
         ("shapes[0].opacity", json!(-0.25), "shapes[0].opacity", "-0.25"),
-        ("shapes[0].opacity", json!({ "texture": "tiles", "threshold": 1.5 }), "shapes[0].opacity.threshold", "from 0 to 1, not 1.5"),
+        (
+            "shapes[0].opacity",
+            json!({ "texture": "tiles", "threshold": 1.5 }),
+            "shapes[0].opacity.threshold",
+            "from 0 to 1, not 1.5",
+        ),
         ("shapes[0].opacity", json!([1, 1, 1]), "shapes[0].opacity", "expected an opacity"),
         ("shapes[0].opacity", json!({ "texture": "tilse" }), "shapes[0].opacity.texture", "did you mean \"tiles\"?"),
     ]);
@@ -141,22 +176,47 @@ fn materials_out_of_range() {
         ("materials.tiled.albedo", json!([0.5, 1.1, 0.5]), "materials.tiled.albedo", "1.1"),
         ("materials.tiled.albedo", json!(-0.1), "materials.tiled.albedo", "-0.1"),
         ("materials.mirror.reflectance", json!(2), "materials.mirror.reflectance", "2.0"),
-        ("materials.mirror.reflectance", json!({ "texture": "tile" }), "materials.mirror.reflectance", "did you mean \"tiles\"?"),
+        (
+            "materials.mirror.reflectance",
+            json!({ "texture": "tile" }),
+            "materials.mirror.reflectance",
+            "did you mean \"tiles\"?",
+        ),
         ("materials.Gold.multiscatter", json!(1), "materials.Gold.multiscatter", "boolean"),
         ("materials.Gold.roughness", json!({ "texture": "wood" }), "materials.Gold.roughness", "no texture"),
         ("materials.Gold.roughness", json!([0.1, 0.2, 0.3]), "materials.Gold.roughness", "expected a number"),
         ("materials.paint.alpha", json!({ "texture": "tile" }), "materials.paint.alpha", "did you mean \"tiles\"?"),
         ("materials.paint.ior", json!({ "texture": "tiles" }), "materials.paint.ior", "\"range\": [low, high]"),
         ("materials.paint.ior", json!({ "texture": "tile", "range": [1.1, 2] }), "materials.paint.ior", "no texture"),
-        ("materials.paint.ior", json!({ "texture": "tiles", "range": [1, 2] }), "materials.paint.ior.range[0]", "above 1"),
-        ("materials.paint.ior", json!({ "texture": "tiles", "range": [1.1, 20] }), "materials.paint.ior.range[1]", "20"),
-        ("materials.glass.ior", json!({ "texture": "tiles", "range": [1.1, 2] }), "materials.glass.ior", "cannot come from a texture"),
+        (
+            "materials.paint.ior",
+            json!({ "texture": "tiles", "range": [1, 2] }),
+            "materials.paint.ior.range[0]",
+            "above 1",
+        ),
+        (
+            "materials.paint.ior",
+            json!({ "texture": "tiles", "range": [1.1, 20] }),
+            "materials.paint.ior.range[1]",
+            "20",
+        ),
+        (
+            "materials.glass.ior",
+            json!({ "texture": "tiles", "range": [1.1, 2] }),
+            "materials.glass.ior",
+            "cannot come from a texture",
+        ),
         ("materials.tiled.roughness", json!(1.5), "materials.tiled.roughness", "1.5"),
         ("materials.Gold.tint", json!([1, 1, 1.5]), "materials.Gold.tint", "1.5"),
         ("materials.Gold.eta", json!([1, 1, 1]), "materials.Gold", "`metal`"),
         ("materials.Gold.metal", Value::Null, "materials.Gold", "`metal`"),
         ("materials.Gold", json!({ "type": "conductor", "eta": [1, 1, 1] }), "materials.Gold", "`k`"),
-        ("materials.Gold", json!({ "type": "conductor", "eta": [1, 0, 1], "k": [1, 1, 1] }), "materials.Gold.eta", "0.0"),
+        (
+            "materials.Gold",
+            json!({ "type": "conductor", "eta": [1, 0, 1], "k": [1, 1, 1] }),
+            "materials.Gold.eta",
+            "0.0",
+        ),
         ("materials.Gold", json!({ "type": "conductor", "eta": [1, 1, 1], "k": [1, -1, 1] }), "materials.Gold.k", "-1"),
         ("materials.Gold.roughness", json!(1.5), "materials.Gold.roughness", "1.5"),
         ("materials.Gold.roughness", json!([0.1, -0.5]), "materials.Gold.roughness", "-0.5"),
@@ -176,7 +236,12 @@ fn older_and_thin_materials_out_of_range() {
     let glass = "materials.glass";
     assert_faults(&[
         (glass, json!({ "type": "thin_dielectric", "ior": 0 }), "materials.glass.ior", "0"),
-        (glass, json!({ "type": "diffuse_transmission", "reflectance": 0.6, "transmittance": 0.6 }), glass, "`transmittance`"),
+        (
+            glass,
+            json!({ "type": "diffuse_transmission", "reflectance": 0.6, "transmittance": 0.6 }),
+            glass,
+            "`transmittance`",
+        ),
         (glass, json!({ "type": "diffuse_transmission", "transmittance": -1 }), "materials.glass.transmittance", "-1"),
         (glass, json!({ "type": "diffuse_transmission", "reflectance": 2 }), "materials.glass.reflectance", "2"),
         (glass, json!({ "type": "phong", "exponent": -1 }), "materials.glass.exponent", "-1"),
@@ -186,7 +251,12 @@ fn older_and_thin_materials_out_of_range() {
             "materials.glass.exponent.range[1]",
             "-1",
         ),
-        (glass, json!({ "type": "thin_dielectric", "ior": { "texture": "tiles", "range": [0, 1] } }), "materials.glass.ior.range[0]", "0"),
+        (
+            glass,
+            json!({ "type": "thin_dielectric", "ior": { "texture": "tiles", "range": [0, 1] } }),
+            "materials.glass.ior.range[0]",
+            "0",
+        ),
         (glass, json!({ "type": "cook_torrance", "m": { "texture": "tile" } }), "materials.glass.m", "no texture"),
         (glass, json!({ "type": "cook_torrance", "f0": { "texture": "tile" } }), "materials.glass.f0", "no texture"),
         (glass, json!({ "type": "phong", "exponent": 1e39 }), "materials.glass.exponent", "inf"),
@@ -221,7 +291,12 @@ fn lights_out_of_range() {
         ("lights[3].transform", json!([{ "scale": 2 }]), "lights[3].transform", "rotated"),
         ("lights[3].transform", json!([{ "scale": [1, 1, 2] }]), "lights[3].transform", "rotated"),
         ("shapes[1].emission.radiance", json!([1, -1, 1]), "shapes[1].emission.radiance", "-1"),
-        ("objects.lamp.shapes[1].emission.radiance", json!([1, 1, -1]), "objects.lamp.shapes[1].emission.radiance", "-1"),
+        (
+            "objects.lamp.shapes[1].emission.radiance",
+            json!([1, 1, -1]),
+            "objects.lamp.shapes[1].emission.radiance",
+            "-1",
+        ),
     ]);
 }
 
@@ -242,7 +317,12 @@ fn shapes_out_of_range() {
         ("shapes[6].profile.bezier", json!([[1, 0], [-5, 1], [-5, 2], [1, 3]]), "shapes[6]", "axis"),
         ("shapes[6].profile", json!({ "b_spline": [[1, 0], [1, 1]] }), "shapes[6]", "2"),
         ("shapes[0].transform", json!([{ "scale": [1, 0, 1] }]), "shapes[0].transform", "singular"),
-        ("shapes[0].transform", json!([{ "rotate": { "axis": [0, 0, 0], "degrees": 10 } }]), "shapes[0].transform[0].rotate.axis", "zero"),
+        (
+            "shapes[0].transform",
+            json!([{ "rotate": { "axis": [0, 0, 0], "degrees": 10 } }]),
+            "shapes[0].transform[0].rotate.axis",
+            "zero",
+        ),
         (
             "shapes[0].transform[1]",
             json!({ "matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 2]] }),
@@ -274,7 +354,8 @@ fn inline_meshes_that_make_no_sense() {
 
 #[test]
 fn objects_that_contain_each_other() {
-    let instances = |names: &[&str]| json!({ "instances": names.iter().map(|name| json!({ "object": name })).collect::<Vec<_>>() });
+    let instances =
+        |names: &[&str]| json!({ "instances": names.iter().map(|name| json!({ "object": name })).collect::<Vec<_>>() });
     let folder = Folder::new();
     let mut scene = good_scene();
     scene["objects"]["a"] = instances(&["lamp", "b"]);
@@ -335,125 +416,4 @@ fn scenes_without_light_or_content() {
     assert_error(&folder, &empty, ErrorKind::Scene, &["shapes: ", "no shapes"]);
     empty["lights"] = json!([{ "type": "environment", "radiance": [1, 1, 1] }]);
     assert!(folder.compile(&empty).is_ok());
-}
-
-#[test]
-fn assets_that_are_missing() {
-    let folder = Folder::new();
-    let mut scene = good_scene();
-    scene["shapes"][1] = json!({ "type": "mesh", "file": "gone.ply" });
-    assert_error(&folder, &scene, ErrorKind::AssetMissing, &["gone.ply", "shapes[1].file"]);
-    scene["shapes"][1]["file"] = json!("gone.obj");
-    assert_error(&folder, &scene, ErrorKind::AssetMissing, &["gone.obj", "shapes[1].file"]);
-    folder.write("here.obj", "mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-    scene["shapes"][1]["file"] = json!("here.obj");
-    assert_error(&folder, &scene, ErrorKind::AssetMissing, &["gone.mtl", "shapes[1].file"]);
-    scene["shapes"][1]["material"] = json!("Gold");
-    assert!(folder.compile(&scene).is_ok());
-    scene["lights"][3] = json!({ "type": "environment", "file": "gone.exr" });
-    assert_error(&folder, &scene, ErrorKind::AssetMissing, &["gone.exr", "lights[3].file"]);
-}
-
-#[test]
-fn files_that_nothing_uses_are_not_read() {
-    let folder = Folder::new();
-    folder.write("bad.png", "not an image");
-    folder.write("bad.ply", "not a mesh");
-    let mut scene = good_scene();
-    for (kind, file) in [("gone", "gone.png"), ("bad", "bad.png")] {
-        scene["textures"][kind] = json!({ "type": "image", "file": file });
-        scene["textures"][format!("{kind}_part")] = json!({ "type": "product", "factors": [{ "texture": kind }, 0.5] });
-        scene["materials"][kind] = json!({ "type": "diffuse", "albedo": { "texture": format!("{kind}_part") } });
-        scene["materials"][format!("{kind}_relief")] = json!({ "type": "relief", "material": kind, "normal_map": { "texture": kind }});
-    }
-    let mesh = |file: &str| json!({ "type": "mesh", "file": file, "material": "gone_relief" });
-    scene["objects"]["idle"] =
-        json!({ "shapes": [mesh("gone.ply"), mesh("bad.ply"), mesh("gone.obj")], "instances": [{ "object": "lamp" }] });
-    let textures = |scene: &Value| folder.compile(scene).unwrap().textures.len();
-    assert!(textures(&scene) > 0);
-    // What is not used is checked all the same.
-    let mut wrong = scene.clone();
-    wrong["textures"]["gone"]["scale"] = json!([1e39, 1]);
-    assert_error(&folder, &wrong, ErrorKind::Scene, &["textures.gone.scale"]);
-    let mut wrong = scene.clone();
-    wrong["objects"]["idle"]["shapes"][0]["material"] = json!("none");
-    assert_error(&folder, &wrong, ErrorKind::Scene, &["objects.idle.shapes[0].material", "none"]);
-    // Each use by the world, and by an object that is used, is one.
-    let quad = |material: &str| json!({ "type": "quad", "material": material });
-    for (pointer, use_, kind, file) in [
-        ("/shapes/2", quad("gone"), ErrorKind::AssetMissing, "gone.png"),
-        ("/shapes/2", quad("bad_relief"), ErrorKind::Scene, "bad.png"),
-        ("/shapes/2", json!({ "type": "quad", "opacity": { "texture": "gone" } }), ErrorKind::AssetMissing, "gone.png"),
-        ("/shapes/2", json!({ "type": "quad", "emission": { "radiance": [1, 1, 1], "texture": "bad_part" } }), ErrorKind::Scene, "bad.png"),
-        ("/objects/lamp/shapes/0", quad("gone_relief"), ErrorKind::AssetMissing, "gone.png"),
-        ("/instances/0/object", json!("idle"), ErrorKind::AssetMissing, "gone."),
-    ] {
-        let mut scene = scene.clone();
-        *scene.pointer_mut(pointer).unwrap() = use_;
-        assert_error(&folder, &scene, kind, &[file]);
-    }
-}
-
-#[test]
-fn assets_that_are_malformed() {
-    let folder = Folder::new();
-    let vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
-    folder.write("bad.mtl", "newmtl m\nKd 1 2 3\n");
-    folder.write("short.mtl", "newmtl m\nKd 1 2\n");
-    let header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n\
-                  property list uchar int vertex_indices\nend_header\n";
-    let files: &[(&str, String, &str)] = &[
-        ("a.obj", format!("{vertices}f 1 2 4\n"), "line 4: a face refers to vertex 4"),
-        ("a.obj", "# nothing\n".into(), "no faces"),
-        ("a.obj", "v 0 0 zero\n".into(), "line 1"),
-        ("a.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".into(), "vertex 0 is not finite"),
-        ("a.obj", format!("mtllib bad.mtl\n{vertices}usemtl m\nf 1 2 3\n"), "material \"m\": Kd"),
-        ("a.obj", format!("mtllib short.mtl\n{vertices}usemtl m\nf 1 2 3\n"), "short.mtl"),
-        ("a.obj", format!("mtllib bad.mtl\n{vertices}usemtl n\nf 1 2 3\n"), "line 5: no material named \"n\""),
-        ("a.ply", "not a ply".into(), "PLY"),
-        ("a.ply", format!("{header}0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"), "vertex 3"),
-        ("a.ply", format!("{header}0 0 0\n1 0 0\n0 1 0\n3 0 1\n"), "Line 13"),
-        ("a.ply", format!("{header}0 0 0\n1 0 0\n"), "PLY"),
-        ("a.ply", format!("{header}0 0 0\n1 0 nan\n0 1 0\n3 0 1 2\n"), "PLY"),
-        ("a.stl", "solid".into(), ".obj or .ply"),
-    ];
-    for (name, content, word) in files {
-        folder.write(name, content);
-        let mut scene = good_scene();
-        scene["shapes"][1] = json!({ "type": "mesh", "file": name });
-        assert_error(&folder, &scene, ErrorKind::Scene, &["shapes[1].file", name, word]);
-    }
-
-    folder.write("sky.exr", "not an image");
-    folder.write("sky.hdr", "not an image");
-    folder.write("sky.png", "not an image");
-    for name in ["sky.exr", "sky.hdr", "sky.png"] {
-        let mut scene = good_scene();
-        scene["lights"][3] = json!({ "type": "environment", "file": name });
-        assert_error(&folder, &scene, ErrorKind::Scene, &["lights[3].file", name]);
-    }
-}
-
-#[test]
-fn scene_files_that_are_no_scenes() {
-    let folder = Folder::new();
-    let load = |content: &[u8]| {
-        let error = import::load_scene(&folder.write("scene.json", content)).unwrap_err();
-        assert_eq!(error.kind(), ErrorKind::Scene);
-        error.to_string()
-    };
-    assert!(load(b"").contains("empty"));
-    assert!(load(b"{}").contains("camera"));
-    assert!(load(b"{ \"camera\": {},\n  \"comment\": \"\xff\" }").contains(":2:15: the file is not UTF-8"));
-    assert!(load(b"{ /* ").contains(":1:3: the comment is never closed"));
-    let whole = good_scene().to_string();
-    for end in (0..whole.len()).step_by(37) {
-        assert!(load(&whole.as_bytes()[..end]).contains("scene.json:1:"), "{end}");
-    }
-    let deep = format!("{{ \"shapes\": {}", "[{\"a\":".repeat(200_000));
-    assert!(load(deep.as_bytes()).contains("recursion limit"));
-
-    let missing = import::load_scene(&folder.write("x", "").with_file_name("none.json")).unwrap_err();
-    assert_eq!(missing.kind(), ErrorKind::AssetMissing);
-    assert!(missing.to_string().contains("none.json"));
 }

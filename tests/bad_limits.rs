@@ -15,14 +15,34 @@ fn outputs_and_films_that_cannot_be_written() {
         json!([output])
     };
     assert_faults(&[
-        ("outputs", out(json!({ "layers": ["crypto_object"], "crypto_depth": 7 })), "outputs[0].crypto_depth", "even number from 2"),
+        (
+            "outputs",
+            out(json!({ "layers": ["crypto_object"], "crypto_depth": 7 })),
+            "outputs[0].crypto_depth",
+            "even number from 2",
+        ),
         ("outputs", out(json!({ "frames_per_second": 0 })), "outputs[0].frames_per_second", "above 0"),
         ("outputs", out(json!({ "dwa_level": 45 })), "outputs[0].dwa_level", "without the compression"),
         ("outputs", out(json!({ "compression": "dwaa", "dwa_level": -1 })), "outputs[0].dwa_level", "from 0 to 100000"),
         ("outputs", out(json!({ "compression": "dwaa", "layers": ["Z"] })), "outputs[0].compression", "would spoil"),
-        ("outputs", out(json!({ "layers": ["Z"], "pixel_types": { "Z": "half" } })), "outputs[0].pixel_types", "32 bits"),
-        ("outputs", json!([{ "file": "o.exr" }, { "file": "p.png" }, { "file": "o.exr" }]), "outputs[2].file", "outputs[0]"),
-        ("film", json!({ "width": 64, "height": 32, "overscan": 33 }), "film.overscan", "at most the picture's shorter side, 32"),
+        (
+            "outputs",
+            out(json!({ "layers": ["Z"], "pixel_types": { "Z": "half" } })),
+            "outputs[0].pixel_types",
+            "32 bits",
+        ),
+        (
+            "outputs",
+            json!([{ "file": "o.exr" }, { "file": "p.png" }, { "file": "o.exr" }]),
+            "outputs[2].file",
+            "outputs[0]",
+        ),
+        (
+            "film",
+            json!({ "width": 64, "height": 32, "overscan": 33 }),
+            "film.overscan",
+            "at most the picture's shorter side, 32",
+        ),
         ("film.overscan", json!(1), "film.overscan", "crop"),
     ]);
 }
@@ -31,7 +51,10 @@ fn outputs_and_films_that_cannot_be_written() {
 fn meshes_with_more_times_than_embree_has() {
     let mesh = |times: usize| {
         let positions = json!([[-1, -1, 0], [1, -1, 0], [0, 1, 0]]);
-        json!({ "type": "mesh", "positions": positions, "triangles": [[0, 1, 2]], "deform_positions": vec![positions.clone(); times] })
+        json!({
+            "type": "mesh", "positions": positions, "triangles": [[0, 1, 2]],
+            "deform_positions": vec![positions.clone(); times]
+        })
     };
     assert_faults(&[("shapes[0]", mesh(129), "shapes[0].deform_positions", "129 further times: there can be 128")]);
     let mut scene = good_scene();
@@ -63,7 +86,9 @@ fn nested_products_of_textures_are_bounded() {
     };
     assert_eq!(compiled(chain(64, 1)), Ok(()));
     assert_eq!(compiled(chain(8, 2)), Ok(()));
-    for (levels, factors, words) in [(65, 1, "more than 64 deep"), (15_000, 1, "more than 64 deep"), (30, 2, "more than 256")] {
+    for (levels, factors, words) in
+        [(65, 1, "more than 64 deep"), (15_000, 1, "more than 64 deep"), (30, 2, "more than 256")]
+    {
         let error = compiled(chain(levels, factors)).unwrap_err();
         assert!(error.contains("textures.t") && error.contains(words), "{error}");
     }

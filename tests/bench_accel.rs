@@ -17,7 +17,20 @@ fn reports_hold_every_accelerator_on_the_same_rays() {
     let folder = Folder::new();
     let out = folder.write("here", "").with_file_name("report");
     let out = out.to_str().unwrap();
-    let run = bench(&[&scene(), "--rays", "400", "--rounds", "1", "--threads", "1,2", "--scaling", "1e3..1e3", "--out", out, "-q"]);
+    let run = bench(&[
+        &scene(),
+        "--rays",
+        "400",
+        "--rounds",
+        "1",
+        "--threads",
+        "1,2",
+        "--scaling",
+        "1e3..1e3",
+        "--out",
+        out,
+        "-q",
+    ]);
     assert!(run.status.success(), "{run:?}");
     let read = |name: &str| std::fs::read_to_string(format!("{out}/{name}")).unwrap();
     let report: Value = serde_json::from_str(&read("accel.json")).unwrap();
@@ -35,7 +48,10 @@ fn reports_hold_every_accelerator_on_the_same_rays() {
             assert!(agreement["rays"].as_u64().unwrap() > 100, "{accel}");
             assert!(!own || agreement["identical"] == agreement["rays"], "{accel}");
             let rates = kind["rates"].as_array().unwrap();
-            assert!(rates.len() >= 2 && rates.iter().all(|r| r["mrays_per_second"][0].as_f64().unwrap() > 0.0), "{accel}");
+            assert!(
+                rates.len() >= 2 && rates.iter().all(|r| r["mrays_per_second"][0].as_f64().unwrap() > 0.0),
+                "{accel}"
+            );
         }
         assert_eq!(accel["structure"].is_null(), accel["name"] == "embree" || accel["name"] == "linear");
     }

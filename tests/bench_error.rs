@@ -27,7 +27,9 @@ fn bench(arguments: &[&str]) -> Output {
 
 fn reference(folder: &Folder, scene: &str) -> String {
     let file = folder.path("reference.exr").to_str().unwrap().to_owned();
-    let run = Command::new(PROGRAM).args(["render", scene, "--spp", "1024", "--seed", "99", "--float", "-q", "-o", &file]).status();
+    let run = Command::new(PROGRAM)
+        .args(["render", scene, "--spp", "1024", "--seed", "99", "--float", "-q", "-o", &file])
+        .status();
     assert!(run.unwrap().success());
     file
 }
@@ -38,8 +40,20 @@ fn reports_compare_variants_and_programs_in_one_run() {
     let scene = scene(&folder);
     let reference = reference(&folder, &scene);
     let out = folder.path("report");
-    let command = format!("self='{PROGRAM}' render {{scene}} --spp {{spp}} --seed {{seed}} --float -q -o {{out}} --json -");
-    let arguments = ["--reference", &reference, "--spp", "1,16", "--repeat", "2", "--sampler", "independent,sobol", "--external", &command];
+    let command =
+        format!("self='{PROGRAM}' render {{scene}} --spp {{spp}} --seed {{seed}} --float -q -o {{out}} --json -");
+    let arguments = [
+        "--reference",
+        &reference,
+        "--spp",
+        "1,16",
+        "--repeat",
+        "2",
+        "--sampler",
+        "independent,sobol",
+        "--external",
+        &command,
+    ];
     let run = bench(&[&[scene.as_str()], &arguments[..], &["--tax", "-q", "--out", out.to_str().unwrap()]].concat());
     assert!(run.status.success(), "{run:?}");
     let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
@@ -71,7 +85,10 @@ fn reports_compare_variants_and_programs_in_one_run() {
     let equal = &report["equal_error"];
     assert!(equal["seconds"].as_array().unwrap().iter().all(Value::is_f64), "{equal}");
     let tax = &report["tax"];
-    assert!(tax["same_hits"] == true && tax["hits"].as_u64().unwrap() > 384 && tax["ratio"][0].as_f64().unwrap() > 0.0, "{tax}");
+    assert!(
+        tax["same_hits"] == true && tax["hits"].as_u64().unwrap() > 384 && tax["ratio"][0].as_f64().unwrap() > 0.0,
+        "{tax}"
+    );
 
     let csv = read("error.csv");
     assert!(csv.lines().count() == 13 && csv.lines().all(|line| line.split(',').count() == 19), "{csv}");

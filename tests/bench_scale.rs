@@ -72,7 +72,9 @@ fn every_sweep_has_its_costs_and_their_slopes() {
     }
 
     // The scenes match their sweep.
-    let counted = |name: &str, what: &str| -> Vec<u64> { points(name).iter().map(|p| p["runs"][0][what].as_u64().unwrap()).collect() };
+    let counted = |name: &str, what: &str| -> Vec<u64> {
+        points(name).iter().map(|p| p["runs"][0][what].as_u64().unwrap()).collect()
+    };
     assert_eq!(counted("triangles", "triangles"), [1_000, 10_000, 20_000]);
     assert_eq!(counted("instances", "instances"), [1, 10, 30]);
     assert_eq!(counted("instances", "triangles"), [2_000; 3]);

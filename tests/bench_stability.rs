@@ -7,7 +7,12 @@ use crate::util::folder::Folder;
 fn bench(folder: &Folder, arguments: &[&str]) -> Output {
     let program = env!("CARGO_BIN_EXE_steradian");
     let out = folder.path("out");
-    Command::new(program).args(["bench", "stability", "--quick", "-q", "--out"]).arg(out).args(arguments).output().unwrap()
+    Command::new(program)
+        .args(["bench", "stability", "--quick", "-q", "--out"])
+        .arg(out)
+        .args(arguments)
+        .output()
+        .unwrap()
 }
 
 fn report(folder: &Folder) -> Value {

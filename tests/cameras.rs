@@ -13,7 +13,10 @@ fn scene(camera: Value) -> Value {
         "sampler": { "spp": 1 },
         "integrator": { "type": "normal" },
         "camera": { "position": [0, 0, 5], "look_at": [0, 0, 0] },
-        "shapes": [{ "type": "cube", "transform": [{ "rotate": { "axis": [0, 1, 0], "degrees": 30 } }, { "translate": [0.3, 0.1, 0] }] }],
+        "shapes": [{
+            "type": "cube",
+            "transform": [{ "rotate": { "axis": [0, 1, 0], "degrees": 30 } }, { "translate": [0.3, 0.1, 0] }]
+        }],
         "outputs": [{ "file": "a.exr", "layers": ["Z", "P"] }]
     });
     merge(&mut scene["camera"], camera);
@@ -57,7 +60,11 @@ fn depth_is_right_for_every_camera() {
         for (x, y) in (0..16).flat_map(|y| (0..32).map(move |x| (x, y))) {
             let (z, p) = (image.pixel(LayerKind::Z, x, y).unwrap()[0], image.pixel(LayerKind::P, x, y).unwrap());
             if z < 1e9 {
-                let expected = if distance { (p[0] * p[0] + p[1] * p[1] + (p[2] - 5.0) * (p[2] - 5.0)).sqrt() } else { 5.0 - p[2] };
+                let expected = if distance {
+                    (p[0] * p[0] + p[1] * p[1] + (p[2] - 5.0) * (p[2] - 5.0)).sqrt()
+                } else {
+                    5.0 - p[2]
+                };
                 assert!((z - expected).abs() < 1e-4, "{camera}: {z} {expected}");
                 assert!(z >= camera["near"].as_f64().unwrap_or(0.0) as f32 - 1e-5, "{camera}: {z}");
                 seen += 1;
@@ -70,8 +77,14 @@ fn depth_is_right_for_every_camera() {
 #[test]
 fn a_far_orthographic_camera_sees_what_a_long_lens_sees() {
     let parallel = render(&scene(json!({ "type": "orthographic", "view_height": 4 })));
-    let far = render(&scene(json!({ "position": [0, 0, 50_000], "vertical_fov_degrees": (4.0f64 / 100_000.0).atan().to_degrees() * 2.0 })));
-    let differing = colors(&parallel).iter().zip(colors(&far)).filter(|(a, b)| a.iter().zip(b).any(|(a, b)| (a - b).abs() > 1e-3)).count();
+    let far = render(&scene(
+        json!({ "position": [0, 0, 50_000], "vertical_fov_degrees": (4.0f64 / 100_000.0).atan().to_degrees() * 2.0 }),
+    ));
+    let differing = colors(&parallel)
+        .iter()
+        .zip(colors(&far))
+        .filter(|(a, b)| a.iter().zip(b).any(|(a, b)| (a - b).abs() > 1e-3))
+        .count();
     assert!(differing <= 4, "{differing} pixels differ");
 }
 
@@ -79,14 +92,17 @@ fn a_far_orthographic_camera_sees_what_a_long_lens_sees() {
 fn a_shifted_picture_is_the_crop_of_a_larger_one() {
     let shifted = render(&scene(json!({ "vertical_fov_degrees": 20, "shift": [0.25, -0.25] })));
     // Twice the size in each direction, and the part right and below of the middle.
-    let mut large = scene(json!({ "vertical_fov_degrees": (2.0 * f64::to_radians(10.0).tan()).atan().to_degrees() * 2.0 }));
+    let mut large =
+        scene(json!({ "vertical_fov_degrees": (2.0 * f64::to_radians(10.0).tan()).atan().to_degrees() * 2.0 }));
     large["film"]["width"] = json!(64);
     large["film"]["height"] = json!(32);
     large["film"]["crop"] = json!([16 + 8, 8 + 4, 32, 16]);
     let part = render(&large);
     let (a, b) = (colors(&shifted), (0..16).flat_map(|y| (0..32).map(move |x| (x, y))));
-    let differing =
-        a.iter().zip(b).filter(|(a, (x, y))| part.rgb(24 + x, 12 + y).unwrap().iter().zip(*a).any(|(b, a)| (a - b).abs() > 1e-4));
+    let differing = a
+        .iter()
+        .zip(b)
+        .filter(|(a, (x, y))| part.rgb(24 + x, 12 + y).unwrap().iter().zip(*a).any(|(b, a)| (a - b).abs() > 1e-4));
     assert!(differing.count() <= 2);
     assert!(a.iter().any(|p| p[0] > 0.0) && a.iter().any(|p| p[0] == 0.0));
 }
@@ -112,7 +128,10 @@ fn blades_shape_what_is_out_of_focus() {
         let mut scene = json!({
             "film": { "width": 33, "height": 33, "filter": { "type": "box" } },
             "sampler": { "spp": 512 },
-            "camera": { "position": [0, 0, 1], "look_at": [0, 0, 0], "vertical_fov_degrees": 40, "lens": { "radius": 0.25, "focus_distance": 1e6 } },
+            "camera": {
+                "position": [0, 0, 1], "look_at": [0, 0, 0], "vertical_fov_degrees": 40,
+                "lens": { "radius": 0.25, "focus_distance": 1e6 }
+            },
             "shapes": [{ "type": "sphere", "radius": 0.03, "emission": { "radiance": [1, 1, 1] } }],
             "integrator": { "type": "path", "max_depth": 1 }
         });
@@ -143,13 +162,17 @@ fn blurred(camera: Value, motion: Value) -> Image {
     let mut scene = scene(json!({ "vertical_fov_degrees": 20 }));
     merge(&mut scene["camera"], camera);
     scene["sampler"]["spp"] = json!(64);
-    scene["shapes"] = json!([{ "type": "sphere", "radius": 0.4, "transform": [{ "translate": [0, 0, 1] }], "motion": motion }]);
+    scene["shapes"] =
+        json!([{ "type": "sphere", "radius": 0.4, "transform": [{ "translate": [0, 0, 1] }], "motion": motion }]);
     render(&scene)
 }
 
 /// Along x, from one place to another.
 fn flight(times: [f64; 2], places: [f64; 2]) -> Value {
-    json!([{ "time": times[0], "transform": [{ "translate": [places[0], 0, 0] }] }, { "time": times[1], "transform": [{ "translate": [places[1], 0, 0] }] }])
+    json!([
+        { "time": times[0], "transform": [{ "translate": [places[0], 0, 0] }] },
+        { "time": times[1], "transform": [{ "translate": [places[1], 0, 0] }] }
+    ])
 }
 
 /// Rounding may turn a sample at an outline into a miss, in few pixels and by few samples.
@@ -184,7 +207,8 @@ fn a_moving_camera_sees_what_a_camera_at_rest_sees_move_the_other_way() {
 fn depth_is_that_at_the_time_of_the_ray() {
     // Towards a wall at z = 0 from z = 5 to 4, evenly: the mean depth is 4.5. That from where the camera stood first is
     // 5.
-    let mut scene = scene(json!({ "motion": [{ "time": 0 }, { "time": 1, "transform": [{ "translate": [0, 0, -1] }] }] }));
+    let mut scene =
+        scene(json!({ "motion": [{ "time": 0 }, { "time": 1, "transform": [{ "translate": [0, 0, -1] }] }] }));
     scene["shapes"] = json!([{ "type": "quad", "transform": [{ "scale": 100 }] }]);
     scene["integrator"]["type"] = json!("depth");
     scene["sampler"]["spp"] = json!(256);
@@ -206,7 +230,8 @@ fn the_shutter_chooses_a_part_of_the_motion() {
         &blurred(
             json!({}),
             json!([
-                { "time": 0 }, { "time": 0.5, "transform": [{ "translate": [0.5, 0, 0] }] }, { "time": 1, "transform": [{ "translate": [0.5, 0, 0] }] }
+                { "time": 0 }, { "time": 0.5, "transform": [{ "translate": [0.5, 0, 0] }] },
+                { "time": 1, "transform": [{ "translate": [0.5, 0, 0] }] }
             ]),
         ),
         "the end",

@@ -42,14 +42,17 @@ fn without_outputs_the_files_are_named_after_the_scene() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr_of(&output));
     let stderr = stderr_of(&output);
     assert!(
-        stderr.contains("wrote scene.exr\n") && stderr.contains("wrote scene.png\n") && stderr.ends_with("Progress: 100%\n"),
+        stderr.contains("wrote scene.exr\n")
+            && stderr.contains("wrote scene.png\n")
+            && stderr.ends_with("Progress: 100%\n"),
         "{stderr}"
     );
     assert!(folder.path().join("scene.png").exists());
     let image = output::read_exr(&folder.path().join("scene.exr")).unwrap();
     assert_eq!(image.size, [24, 16]);
 
-    let stats: Value = serde_json::from_str(&std::fs::read_to_string(folder.path().join("stats.json")).unwrap()).unwrap();
+    let stats: Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.path().join("stats.json")).unwrap()).unwrap();
     assert_eq!(
         (&stats["samples"], &stats["spp"], &stats["interrupted"]),
         (&Value::from(24 * 16 * 2), &Value::from(2), &Value::from(false))
@@ -83,8 +86,9 @@ fn quiet_runs_say_nothing_and_statistics_go_to_stdout() {
     for (name, seed) in [("b.exr", 0), ("c.exr", 1)] {
         assert!(run(folder.path(), &format!("render scene.json -q -o {name} --seed {seed}")).status.success());
     }
-    let compare =
-        |name: &str| -> Value { serde_json::from_slice(&run(folder.path(), &format!("compare a.exr {name} --json")).stdout).unwrap() };
+    let compare = |name: &str| -> Value {
+        serde_json::from_slice(&run(folder.path(), &format!("compare a.exr {name} --json")).stdout).unwrap()
+    };
     assert_eq!((&compare("b.exr")["mse"], &compare("b.exr")["psnr"]), (&Value::from(0.0), &Value::Null));
     assert!(compare("c.exr")["mse"].as_f64().is_some_and(|mse| mse > 0.0));
 }
@@ -94,7 +98,10 @@ fn a_replay_prints_the_sample_and_writes_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let output = run(folder.path(), "render scene.json --pixel 12,8 --sample 1");
     let text = String::from_utf8(output.stdout).unwrap();
-    assert!(text.starts_with("radiance  ") && text.contains("\nalpha     1\n") && text.contains("\ndepth     3"), "{text}");
+    assert!(
+        text.starts_with("radiance  ") && text.contains("\nalpha     1\n") && text.contains("\ndepth     3"),
+        "{text}"
+    );
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     assert_eq!(run(folder.path(), "render scene.json --pixel 24,8 --sample 1").status.code(), Some(2));
 }
@@ -104,7 +111,8 @@ fn a_replay_prints_the_sample_and_writes_nothing() {
 fn interrupted_renders_write_their_picture() {
     for (signal, code) in [(Signal::INT, 130), (Signal::TERM, 143)] {
         let folder = tempfile::tempdir().unwrap();
-        let mut command = steradian(folder.path(), "render scene.json --spp 2000000000 --time-limit 60 -o a.exr --threads 1");
+        let mut command =
+            steradian(folder.path(), "render scene.json --spp 2000000000 --time-limit 60 -o a.exr --threads 1");
         let mut child = Running::start(command.stderr(Stdio::piped()));
         // With the first line of progress the program listens.
         let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();

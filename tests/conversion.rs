@@ -16,7 +16,9 @@ fn picture(path: &Path) -> Vec<[u32; 3]> {
     let imported = read_scene(path, &ImportOptions::default()).unwrap();
     let settings = Settings::new(&imported.desc, &overrides).unwrap();
     let scene = compile::compile_from(&imported.desc, imported.source(path)).unwrap();
-    pixels(&render_with(&Prepared { scene, settings }, AccelKind::EMBREE).image).map(|pixel| pixel.map(f32::to_bits)).collect()
+    pixels(&render_with(&Prepared { scene, settings }, AccelKind::EMBREE).image)
+        .map(|pixel| pixel.map(f32::to_bits))
+        .collect()
 }
 
 fn convert(path: &Path, target: &Path, originals: Originals) -> steradian::Result<usize> {
@@ -48,17 +50,20 @@ fn converted_scenes_give_the_same_picture() {
 #[test]
 fn colours_of_vertices_and_uv_that_a_file_lacks_are_converted() {
     let folder = tempfile::tempdir().unwrap();
-    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n\
-               property uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+               property uchar red\n\
+               property uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int vertex_indices\n\
+               end_header\n\
                -1 -1 -5 255 0 7\n1 -1 -5 0 130 99\n0 1 -5 3 200 255\n3 0 1 2\n";
     std::fs::write(folder.path().join("m.ply"), ply).unwrap();
-    let texture = |kind: &str, name: &str, more: &str| format!("<texture type=\"{kind}\" name=\"{name}\">{more}</texture>");
+    let texture =
+        |kind: &str, name: &str, more: &str| format!("<texture type=\"{kind}\" name=\"{name}\">{more}</texture>");
     let colors = texture("mesh_attribute", "diffuse_reflectance", "<string name=\"name\" value=\"vertex_color\"/>");
     let path = folder.path().join("s.xml");
     let scene = format!(
-        "<scene version=\"3.0.0\"><sensor type=\"perspective\"><transform name=\"to_world\"><scale x=\"-1\" z=\"-1\"/></transform></sensor>\
-         <emitter type=\"constant\"/><shape type=\"ply\"><string name=\"filename\" value=\"m.ply\"/><bsdf type=\"twosided\"><bsdf type=\"roughplastic\">\
-         {colors}{}</bsdf></bsdf></shape></scene>",
+        "<scene version=\"3.0.0\"><sensor type=\"perspective\"><transform name=\"to_world\"><scale x=\"-1\" \
+         z=\"-1\"/></transform></sensor><emitter type=\"constant\"/><shape type=\"ply\"><string name=\"filename\" \
+         value=\"m.ply\"/><bsdf type=\"twosided\"><bsdf type=\"roughplastic\">{colors}{}</bsdf></bsdf></shape></scene>",
         texture("checkerboard", "specular_reflectance", "")
     );
     std::fs::write(&path, scene).unwrap();
@@ -73,7 +78,8 @@ fn colours_of_vertices_and_uv_that_a_file_lacks_are_converted() {
 fn files_that_nothing_uses_need_not_be_there() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("s.json");
-    let scene = r#"{ "camera": { "position": [0, 0, 5], "look_at": [0, 0, 0] }, "lights": [{ "type": "environment", "radiance": [1, 1, 1] }],
+    let scene = r#"{ "camera": { "position": [0, 0, 5], "look_at": [0, 0, 0] },
+        "lights": [{ "type": "environment", "radiance": [1, 1, 1] }],
         "shapes": [{ "type": "sphere" }], "textures": { "t": { "type": "image", "file": "gone.png" } },
         "objects": { "o": { "shapes": [{ "type": "mesh", "file": "gone.ply" }] } } }"#;
     std::fs::write(&path, scene).unwrap();
@@ -103,7 +109,9 @@ fn errors_name_the_place_in_the_imported_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("s.xml");
     let message = |shape: &str| {
-        let scene = format!("<scene version=\"3.0.0\"><sensor type=\"perspective\"/>\n{shape}\n<emitter type=\"constant\"/></scene>");
+        let scene = format!(
+            "<scene version=\"3.0.0\"><sensor type=\"perspective\"/>\n{shape}\n<emitter type=\"constant\"/></scene>"
+        );
         std::fs::write(&path, scene).unwrap();
         let imported = read_scene(&path, &ImportOptions::default()).unwrap();
         compile::compile_from(&imported.desc, imported.source(&path)).err().unwrap().to_string()

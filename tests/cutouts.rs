@@ -5,7 +5,9 @@ use steradian::geometry::{AlphaMask, AlphaMasks, Geometry, Hit, Shape, Sphere, T
 use steradian::id::ShapeId;
 use steradian::math::{DMat3, DVec3, Ray};
 
-use crate::util::geometry::{Rng, cube, grid, ids, instances, meshes, placed_analytic_shapes, ray, ray_through, soup, transform, world};
+use crate::util::geometry::{
+    Rng, cube, grid, ids, instances, meshes, placed_analytic_shapes, ray, ray_through, soup, transform, world,
+};
 
 /// Every shape but the first has the same coverage everywhere.
 #[derive(Debug)]
@@ -88,7 +90,8 @@ fn every_accelerator_sees_the_same_holes() {
 fn a_ray_passes_any_number_of_layers() {
     // A thousand quads behind each other, then a wall.
     let wall = grid(DVec3::new(-1.0, -1.0, 2.0), 2.0 * DVec3::X, 2.0 * DVec3::Y, 1, |_, _| 0.0);
-    let layer = |i: u32| grid(DVec3::new(-1.0, -1.0, f64::from(i) * 1e-3), 2.0 * DVec3::X, 2.0 * DVec3::Y, 1, |_, _| 0.0);
+    let layer =
+        |i: u32| grid(DVec3::new(-1.0, -1.0, f64::from(i) * 1e-3), 2.0 * DVec3::X, 2.0 * DVec3::Y, 1, |_, _| 0.0);
     let scene = meshes(std::iter::once(wall).chain((0..1000).map(layer)).collect());
     for (coverage, expected) in [(0.0, 0), (1.0, 1)] {
         let geometry = with(Veil(coverage), scene.clone());
@@ -104,13 +107,16 @@ fn a_ray_passes_any_number_of_layers() {
 
 #[test]
 fn light_passes_a_veil_as_its_layers_say() {
-    let layers = (0..3).map(|i| grid(DVec3::new(-1.0, -1.0, f64::from(i)), 2.0 * DVec3::X, 2.0 * DVec3::Y, 1, |_, _| 0.0));
+    let layers =
+        (0..3).map(|i| grid(DVec3::new(-1.0, -1.0, f64::from(i)), 2.0 * DVec3::X, 2.0 * DVec3::Y, 1, |_, _| 0.0));
     let unseen = soup(&mut Rng::new(1), 1, 1e-3);
     let geometry = with(Veil(0.3), meshes(std::iter::once(unseen).chain(layers).collect()));
     let accel = build(AccelKind::EMBREE, &geometry, 1).unwrap();
     let mut rng = Rng::new(72);
     let n = 100_000;
-    let free = (0..n).filter(|_| !accel.occluded(&ray(DVec3::new(rng.range(-0.9, 0.9), rng.range(-0.9, 0.9), -1.0), DVec3::Z))).count();
+    let free = (0..n)
+        .filter(|_| !accel.occluded(&ray(DVec3::new(rng.range(-0.9, 0.9), rng.range(-0.9, 0.9), -1.0), DVec3::Z)))
+        .count();
     let expected: f64 = 0.7 * 0.7 * 0.7;
     // Five standard deviations: false alarm 6e-7.
     let bound = 5.0 * (expected * (1.0 - expected) / f64::from(n)).sqrt();

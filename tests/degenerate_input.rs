@@ -15,12 +15,17 @@ use crate::util::render::{Prepared, pixels, render_with};
 use crate::util::scenes::all_answers;
 
 /// A valid ray.
-const GOOD: Ray = Ray { origin: Vec3::new(0.1, 0.2, 0.3), t_min: 0.0, direction: Vec3::Z, t_max: f32::INFINITY, time: 0.0 };
+const GOOD: Ray =
+    Ray { origin: Vec3::new(0.1, 0.2, 0.3), t_min: 0.0, direction: Vec3::Z, t_max: f32::INFINITY, time: 0.0 };
 
 #[test]
 fn an_instance_beyond_f32_is_an_error_and_a_small_one_is_not() {
-    let scaled =
-        |scale: f64| instances(vec![Shape::Mesh(cube(DMat3::IDENTITY, DVec3::ZERO))], &[transform(DMat3::IDENTITY * scale, DVec3::ZERO)]);
+    let scaled = |scale: f64| {
+        instances(
+            vec![Shape::Mesh(cube(DMat3::IDENTITY, DVec3::ZERO))],
+            &[transform(DMat3::IDENTITY * scale, DVec3::ZERO)],
+        )
+    };
     for scale in [1e-16, 1e-30, 1e16, 1e30] {
         let message = EmbreeAccel::new(&scaled(scale), 1).err().expect("no inverse in f32").to_string();
         assert!(message.contains("instance 0"), "{message}");
@@ -72,9 +77,14 @@ fn meshes_without_area_are_skipped() {
     folder.write("m.mtl", "newmtl a\nKd 1 1 1\nKe 1 1 1\nnewmtl b\nKd 1 1 1\n");
     folder.write(
         "cloud.ply",
-        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n",
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n\
+         0 0 0\n",
     );
-    let inline = |triangles: Value| json!({ "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [3, 0, 0]], "triangles": triangles });
+    let inline = |triangles: Value| {
+        json!({
+            "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [3, 0, 0]], "triangles": triangles
+        })
+    };
     let file = |name: &str| json!({ "type": "mesh", "file": name });
     let with = |mut shape: Value, key: &str, value: Value| {
         shape[key] = value;
@@ -83,7 +93,13 @@ fn meshes_without_area_are_skipped() {
     let lamp = json!({ "radiance": [1, 1, 1] });
     let motion = json!([{ "time": 0 }, { "time": 1, "transform": [{ "translate": [1, 0, 0] }] }]);
     let sphere = json!({ "type": "sphere" });
-    let nothing = [inline(json!([])), inline(json!([[0, 1, 2], [0, 1, 1]])), file("points.obj"), file("flat.obj"), file("cloud.ply")];
+    let nothing = [
+        inline(json!([])),
+        inline(json!([[0, 1, 2], [0, 1, 1]])),
+        file("points.obj"),
+        file("flat.obj"),
+        file("cloud.ply"),
+    ];
     let lamps = nothing.clone().map(|shape| with(shape, "emission", lamp.clone()));
     let moving = nothing.clone().map(|shape| with(shape, "motion", motion.clone()));
     let with_all = |others: &[Value]| [&nothing[..], &lamps, &moving, others].concat();
@@ -97,7 +113,10 @@ fn meshes_without_area_are_skipped() {
     let scene = folder.compile(&scene).unwrap();
     // Two spheres and a triangle, of which one sphere is an instance's; no light but the sky.
     let geometry = &scene.geometry;
-    assert_eq!((geometry.shapes.len(), geometry.world.len(), geometry.objects.len(), geometry.instances.len()), (3, 2, 1, 1));
+    assert_eq!(
+        (geometry.shapes.len(), geometry.world.len(), geometry.objects.len(), geometry.instances.len()),
+        (3, 2, 1, 1)
+    );
     assert_eq!(scene.lights.lights().len(), 1);
     for (kind, name) in AccelKind::ALL {
         let accel = build(kind, geometry, 1).unwrap();
@@ -122,7 +141,8 @@ fn imported_scenes_are_rendered_without_what_has_no_area() {
         "s.xml",
         r#"<scene version="3.0.0"><sensor type="perspective"><film type="hdrfilm"><integer name="width" value="8"/>
         <integer name="height" value="8"/></film></sensor>
-        <shape type="obj"><string name="filename" value="empty.obj"/><emitter type="area"><rgb name="radiance" value="1"/></emitter></shape>
+        <shape type="obj"><string name="filename" value="empty.obj"/><emitter type="area">
+        <rgb name="radiance" value="1"/></emitter></shape>
         <shape type="cylinder"><float name="radius" value="0"/></shape></scene>"#,
     );
     for path in [pbrt, mitsuba] {
@@ -160,7 +180,8 @@ fn wild_ray(rng: &mut Rng) -> Ray {
 fn no_valid_ray_ends_the_process() {
     let mut rng = Rng::new(21);
     let turned = |rng: &mut Rng| transform(rng.rotation() * 10f64.powf(rng.range(-6.0, 6.0)), rng.cube());
-    let placements: Vec<_> = (0..9).map(|_| turned(&mut rng)).chain([transform(DMat3::IDENTITY, DVec3::ZERO)]).collect();
+    let placements: Vec<_> =
+        (0..9).map(|_| turned(&mut rng)).chain([transform(DMat3::IDENTITY, DVec3::ZERO)]).collect();
     let mut shapes = placed_analytic_shapes(&mut rng, DVec3::ZERO);
     shapes.push(Shape::Mesh(soup(&mut rng, 301, 0.3)));
     for geometry in [crate::util::geometry::world(shapes.clone()), instances(shapes, &placements)] {

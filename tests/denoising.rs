@@ -4,7 +4,8 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatImage, FlatSamples, LayerAttributes, ReadChannels, ReadLayers, Vec2, WritableImage, f16,
+    AnyChannel, AnyChannels, Encoding, FlatImage, FlatSamples, LayerAttributes, ReadChannels, ReadLayers, Vec2,
+    WritableImage, f16,
 };
 use serde_json::{Value, json};
 use steradian::denoise::{Denoiser, FEATURE_LAYERS, FileOptions, Report, denoise_file, denoise_image};
@@ -18,7 +19,11 @@ fn denoiser(threads: usize) -> Denoiser {
 }
 
 fn run(folder: &Path, arguments: &str) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_steradian")).current_dir(folder).args(arguments.split_whitespace()).output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_steradian"))
+        .current_dir(folder)
+        .args(arguments.split_whitespace())
+        .output()
+        .unwrap()
 }
 
 fn stderr(output: &Output) -> String {
@@ -37,17 +42,24 @@ fn picture(size: [u32; 2], pixel: impl Fn(u32, u32) -> [f32; 4]) -> Image {
 
 /// A room of coloured walls with a diffuse and a glossy box, lit by two lamps of two groups.
 fn room(spp: u32, layers: &[&str]) -> Value {
-    let quad = |origin: [f64; 3], u: [f64; 3], v: [f64; 3], material: &str| json!({ "type": "quad", "origin": origin, "edge_u": u, "edge_v": v, "material": material });
+    let quad = |origin: [f64; 3], u: [f64; 3], v: [f64; 3], material: &str| {
+        json!({
+            "type": "quad", "origin": origin, "edge_u": u, "edge_v": v, "material": material
+        })
+    };
     let lamp = |x: f64, radiance: [f64; 3], group: &str| {
         json!({
-            "type": "quad", "origin": [x, 1.98, -0.2], "edge_u": [0.4, 0, 0], "edge_v": [0, 0, 0.4], "material": "white",
-            "emission": { "radiance": radiance, "group": group }
+            "type": "quad", "origin": [x, 1.98, -0.2], "edge_u": [0.4, 0, 0], "edge_v": [0, 0, 0.4],
+            "material": "white", "emission": { "radiance": radiance, "group": group }
         })
     };
     let cube = |size: f64, x: f64, z: f64, degrees: f64, material: &str| {
         json!({
             "type": "cube", "material": material,
-            "transform": [{ "scale": [0.3, size, 0.3] }, { "rotate": { "axis": [0, 1, 0], "degrees": degrees } }, { "translate": [x, size, z] }]
+            "transform": [
+                { "scale": [0.3, size, 0.3] }, { "rotate": { "axis": [0, 1, 0], "degrees": degrees } },
+                { "translate": [x, size, z] }
+            ]
         })
     };
     json!({
@@ -81,9 +93,11 @@ fn an_absent_library_or_another_file_is_named() {
     let root = folder.path();
     std::fs::write(root.join("other.so"), "no library").unwrap();
     std::fs::create_dir(root.join("empty")).unwrap();
-    for (library, words) in
-        [("missing.so", "there is no such file"), ("other.so", "cannot serve as Open Image Denoise"), ("empty", "pip install pyoidn")]
-    {
+    for (library, words) in [
+        ("missing.so", "there is no such file"),
+        ("other.so", "cannot serve as Open Image Denoise"),
+        ("empty", "pip install pyoidn"),
+    ] {
         let failed = run(root, &format!("denoise a.exr b.exr --oidn-library {library}"));
         assert_eq!(failed.status.code(), Some(4), "{}", stderr(&failed));
         assert!(stderr(&failed).contains(words) && stderr(&failed).lines().count() == 1, "{}", stderr(&failed));
@@ -98,9 +112,12 @@ fn an_absent_library_or_another_file_is_named() {
     std::fs::write(root.join("scene.json"), room(1 << 20, &[]).to_string()).unwrap();
     let failed = run(root, "render scene.json --denoise --oidn-library empty");
     assert_eq!(failed.status.code(), Some(4), "{}", stderr(&failed));
-    for arguments in
-        ["denoise a.exr b.png", "denoise a.exr b.exr -o c.exr", "denoise a.####.exr b.exr", "denoise a.exr b.exr --no-features --albedo x"]
-    {
+    for arguments in [
+        "denoise a.exr b.png",
+        "denoise a.exr b.exr -o c.exr",
+        "denoise a.####.exr b.exr",
+        "denoise a.exr b.exr --no-features --albedo x",
+    ] {
         assert_eq!(run(root, arguments).status.code(), Some(2), "{arguments}");
     }
 }
@@ -165,12 +182,17 @@ fn the_error_of_a_room_halves_and_more_and_groups_still_sum() {
         .filter(|info| matches!(info.source, steradian::film::LayerSource::LightAov(_)))
         .map(|info| info.name)
         .collect();
-    let layers: Vec<&str> = ["feature_albedo", "feature_normal", "light_groups", "variance"].into_iter().chain(kinds).collect();
+    let layers: Vec<&str> =
+        ["feature_albedo", "feature_normal", "light_groups", "variance"].into_iter().chain(kinds).collect();
     let (reference, noisy) = (render(&room(4096, &["light_groups"])), render(&room(16, &layers)));
     let mut image = noisy.clone();
     let report = denoise_image(&denoiser, &mut image).unwrap();
     let (before, after) = (relmse(&reference, &noisy), relmse(&reference, &image));
-    eprintln!("relative squared error {before:.5} noisy, {after:.5} denoised in {:.2} s: {}", report.seconds, report.attribute());
+    eprintln!(
+        "relative squared error {before:.5} noisy, {after:.5} denoised in {:.2} s: {}",
+        report.seconds,
+        report.attribute()
+    );
     assert!(after <= 0.5 * before, "{before} {after}");
     assert!(report.attribute().ends_with("albedo and normal prefiltered"), "{}", report.attribute());
 
@@ -180,8 +202,10 @@ fn the_error_of_a_room_halves_and_more_and_groups_still_sum() {
         assert_eq!(image.layer(kind), noisy.layer(kind));
     }
     let is_group = |layer: &&Layer| layer.kind == LayerKind::LightGroups;
-    let is_part = |layer: &&Layer| matches!(LayerInfo::of(layer.kind).source, steradian::film::LayerSource::LightAov(_));
-    let sums = [image.layers.iter().filter(is_group).collect::<Vec<_>>(), image.layers.iter().filter(is_part).collect()];
+    let is_part =
+        |layer: &&Layer| matches!(LayerInfo::of(layer.kind).source, steradian::film::LayerSource::LightAov(_));
+    let sums =
+        [image.layers.iter().filter(is_group).collect::<Vec<_>>(), image.layers.iter().filter(is_part).collect()];
     assert_eq!(sums.each_ref().map(Vec::len), [3, 8]);
     assert_eq!(report.layers.len(), 12);
     for parts in sums {
@@ -219,18 +243,24 @@ fn mirror(spp: u32, strategy: &str) -> Value {
                 "mirror": { "type": "mirror", "reflectance": 0.9 },
                 "tiles": { "type": "diffuse", "albedo": { "texture": "tiles" } }
             },
-            "textures": { "tiles": { "type": "checker", "color0": [0.5, 0.5, 0.5], "color1": [0.25, 0.25, 0.25], "scale": [8, 8] } }
+            "textures": {
+                "tiles": { "type": "checker", "color0": [0.5, 0.5, 0.5], "color1": [0.25, 0.25, 0.25], "scale": [8, 8] }
+            }
         }),
     );
     let shapes = scene["shapes"].as_array_mut().unwrap();
     shapes.truncate(0);
     shapes.extend([
-        json!({ "type": "quad", "origin": [-1, 0, -1], "edge_u": [2, 0, 0], "edge_v": [0, 2, 0], "material": "mirror" }),
+        json!({
+            "type": "quad", "origin": [-1, 0, -1], "edge_u": [2, 0, 0], "edge_v": [0, 2, 0], "material": "mirror"
+        }),
         json!({ "type": "quad", "origin": [1, 0, 1], "edge_u": [-2, 0, 0], "edge_v": [0, 2, 0], "material": "tiles" }),
         json!({ "type": "quad", "origin": [-1, 0, 1], "edge_u": [2, 0, 0], "edge_v": [0, 0, -2], "material": "white" }),
         json!({ "type": "quad", "origin": [-1, 0, 1], "edge_u": [0, 0, -2], "edge_v": [0, 2, 0], "material": "red" }),
-        json!({ "type": "quad", "origin": [-0.4, 1.98, -0.4], "edge_u": [0.8, 0, 0], "edge_v": [0, 0, 0.4], "material": "white",
-                "emission": { "radiance": [10, 10, 10] } }),
+        json!({
+            "type": "quad", "origin": [-0.4, 1.98, -0.4], "edge_u": [0.8, 0, 0], "edge_v": [0, 0, 0.4],
+            "material": "white", "emission": { "radiance": [10, 10, 10] }
+        }),
     ]);
     scene
 }
@@ -246,7 +276,10 @@ fn features_keep_what_a_mirror_shows_sharp() {
     let report = denoise_image(&denoiser, &mut without).unwrap();
     assert!(report.attribute().ends_with("without albedo and normal"));
     let errors = [&noisy, &without, &with].map(|image| relmse(&reference, image));
-    eprintln!("relative squared errors: noisy {:.5}, without features {:.5}, with {:.5}", errors[0], errors[1], errors[2]);
+    eprintln!(
+        "relative squared errors: noisy {:.5}, without features {:.5}, with {:.5}",
+        errors[0], errors[1], errors[2]
+    );
     assert!(errors[2] < 0.5 * errors[1] && errors[1] < errors[0], "{errors:?}");
 }
 
@@ -254,8 +287,9 @@ fn features_keep_what_a_mirror_shows_sharp() {
 fn foreign_file(path: &Path) -> FlatImage {
     let size = Vec2(40, 30);
     let noise = |i: usize, k: usize| ((i * 7919 + k * 104_729) % 1009) as f32 / 1009.0;
-    let half =
-        |name: &str, k: usize| AnyChannel::new(name, FlatSamples::F16((0..size.area()).map(|i| f16::from_f32(noise(i, k))).collect()));
+    let half = |name: &str, k: usize| {
+        AnyChannel::new(name, FlatSamples::F16((0..size.area()).map(|i| f16::from_f32(noise(i, k))).collect()))
+    };
     let float = |name: &str, value: f32| AnyChannel::new(name, FlatSamples::F32(vec![value; size.area()]));
     let mut list: Vec<_> = ["R", "G", "B", "A"].iter().enumerate().map(|(k, name)| half(name, k)).collect();
     list.extend([float("Z", f32::INFINITY), float("Albedo.R", 0.5), float("Albedo.G", 0.5), float("Albedo.B", 0.5)]);
@@ -263,14 +297,29 @@ fn foreign_file(path: &Path) -> FlatImage {
     list.push(AnyChannel::new("id", FlatSamples::U32((0..size.area() as u32).collect())));
     let mut attributes = LayerAttributes { layer_position: Vec2(-4, 7), ..LayerAttributes::default() };
     attributes.other.insert("shot".into(), exr::prelude::attribute::AttributeValue::Text("12b".into()));
-    let layer = exr::prelude::Layer::new(size, attributes, Encoding::SMALL_FAST_LOSSLESS, AnyChannels::sort(list.into_iter().collect()));
-    let image = FlatImage::from_layers(exr::prelude::ImageAttributes::with_size(Vec2(64, 48)), exr::prelude::SmallVec::from_iter([layer]));
+    let layer = exr::prelude::Layer::new(
+        size,
+        attributes,
+        Encoding::SMALL_FAST_LOSSLESS,
+        AnyChannels::sort(list.into_iter().collect()),
+    );
+    let image = FlatImage::from_layers(
+        exr::prelude::ImageAttributes::with_size(Vec2(64, 48)),
+        exr::prelude::SmallVec::from_iter([layer]),
+    );
     image.write().to_file(path).unwrap();
     read(path)
 }
 
 fn read(path: &Path) -> FlatImage {
-    exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes().from_file(path).unwrap()
+    exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .from_file(path)
+        .unwrap()
 }
 
 #[test]
@@ -286,9 +335,13 @@ fn everything_else_of_a_file_stays() {
     let (old, new) = (&before.layer_data[0], &mut after.layer_data[0]);
     let denoised = new.attributes.other.remove(&exr::prelude::Text::from(Report::ATTRIBUTE)).unwrap();
     assert_eq!(denoised, exr::prelude::attribute::AttributeValue::Text(report.attribute().as_str().into()));
-    assert_eq!((&new.attributes, new.encoding, new.size, &after.attributes), (&old.attributes, old.encoding, old.size, &before.attributes));
-    let find =
-        |list: &[AnyChannel<FlatSamples>], name: &str| list.iter().find(|c| c.name == *name).unwrap_or_else(|| panic!("{name}")).clone();
+    assert_eq!(
+        (&new.attributes, new.encoding, new.size, &after.attributes),
+        (&old.attributes, old.encoding, old.size, &before.attributes)
+    );
+    let find = |list: &[AnyChannel<FlatSamples>], name: &str| {
+        list.iter().find(|c| c.name == *name).unwrap_or_else(|| panic!("{name}")).clone()
+    };
     let list = &new.channel_data.list;
     assert_eq!(list.len(), old.channel_data.list.len() + 4);
     for channel in &old.channel_data.list {
@@ -314,7 +367,10 @@ fn the_program_denoises_renders_and_files() {
     let done = run(root, "render room.json --denoise --crop 8,8,48,40 -o a.exr -o a.png --json stats.json");
     assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
     let stats: Value = serde_json::from_str(&std::fs::read_to_string(root.join("stats.json")).unwrap()).unwrap();
-    assert!(stats["denoise"]["seconds"].as_f64().unwrap() > 0.0 && stats["denoise"]["layers"] == json!(["color"]), "{stats}");
+    assert!(
+        stats["denoise"]["seconds"].as_f64().unwrap() > 0.0 && stats["denoise"]["layers"] == json!(["color"]),
+        "{stats}"
+    );
     let file = read(&root.join("a.exr"));
     let names: Vec<String> = file.layer_data[0].channel_data.list.iter().map(|c| c.name.to_string()).collect();
     assert_eq!(names, ["A", "B", "G", "R", "noisy.A", "noisy.B", "noisy.G", "noisy.R"]);
@@ -322,7 +378,11 @@ fn the_program_denoises_renders_and_files() {
 
     // The same in two steps, through files of 32 bits.
     assert!(run(root, "render room.json --denoise --float -o one.exr").status.success());
-    assert!(run(root, "render room.json --float --layers feature_albedo,feature_normal,light_groups -o n.0003.exr").status.success());
+    assert!(
+        run(root, "render room.json --float --layers feature_albedo,feature_normal,light_groups -o n.0003.exr")
+            .status
+            .success()
+    );
     let done = run(root, "denoise n.####.exr d.####.exr -o d.####.png --json");
     assert!(done.status.success() && root.join("d.0003.png").exists(), "{}", stderr(&done));
     let report: Value = serde_json::from_slice(&done.stdout).unwrap();

@@ -12,13 +12,17 @@ fn scene() -> Value {
         "camera": { "position": [0, 1.2, 4], "look_at": [0, 0.5, 0], "lens": { "radius": 0.05, "focus_distance": 4 } },
         "sampler": { "spp": 7 },
         "materials": {
-            "grey": { "type": "diffuse" }, "glass": { "type": "dielectric" }, "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 }
+            "grey": { "type": "diffuse" }, "glass": { "type": "dielectric" },
+            "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 }
         },
         "shapes": [
             { "type": "quad", "material": "grey", "origin": [-4, 0, 4], "edge_u": [8, 0, 0], "edge_v": [0, 0, -8] },
             { "type": "sphere", "material": "glass", "radius": 0.5, "transform": [{ "translate": [-0.6, 0.5, 0] }] },
             { "type": "cube", "material": "gold", "transform": [{ "scale": 0.4 }, { "translate": [0.7, 0.4, -0.3] }] },
-            { "type": "disk", "emission": { "radiance": [9, 8, 7] }, "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": 90 } }, { "translate": [0, 3, 0] }] }
+            {
+                "type": "disk", "emission": { "radiance": [9, 8, 7] },
+                "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": 90 } }, { "translate": [0, 3, 0] }]
+            }
         ],
         "lights": [{ "type": "environment", "radiance": [0.2, 0.3, 0.4] }]
     })
@@ -26,7 +30,13 @@ fn scene() -> Value {
 
 fn assert_same_with_any_number_of_threads(scene: &Value) {
     let images: Vec<_> = [1, 2, 3, 8]
-        .map(|threads| render_with(&prepare(scene, &Overrides { threads: Some(threads), ..Overrides::default() }), AccelKind::EMBREE).image)
+        .map(|threads| {
+            render_with(
+                &prepare(scene, &Overrides { threads: Some(threads), ..Overrides::default() }),
+                AccelKind::EMBREE,
+            )
+            .image
+        })
         .into();
     assert!(images.windows(2).all(|w| w[0] == w[1]));
 }
@@ -75,7 +85,11 @@ fn a_replayed_sample_is_the_one_in_the_picture() {
     let prepared = one(7);
     let image = render_with(&prepared, AccelKind::EMBREE).image;
     let mean = (0..7)
-        .map(|s| f64::from(render::replay(&prepared.scene, &*accel, &prepared.settings, [20, 17], s).unwrap().pixel.radiance.g))
+        .map(|s| {
+            f64::from(
+                render::replay(&prepared.scene, &*accel, &prepared.settings, [20, 17], s).unwrap().pixel.radiance.g,
+            )
+        })
         .sum::<f64>()
         / 7.0;
     assert_eq!(image.rgb(20, 17).unwrap()[1], mean as f32);
@@ -98,6 +112,9 @@ fn embree_and_the_oracle_give_the_same_picture() {
 
 #[test]
 fn seeds_give_different_noise() {
-    let image = |seed| render_with(&prepare(&scene(), &Overrides { seed: Some(seed), ..Overrides::default() }), AccelKind::EMBREE).image;
+    let image = |seed| {
+        render_with(&prepare(&scene(), &Overrides { seed: Some(seed), ..Overrides::default() }), AccelKind::EMBREE)
+            .image
+    };
     assert_ne!(image(1), image(2));
 }

@@ -14,7 +14,8 @@ const SCENE: &str = r#"{
     "film": { "width": 40, "height": 30 },
     "camera": { "position": [0, 0, 4], "look_at": [0, 0, 0], "vertical_fov_degrees": 40 },
     "sampler": { "spp": 16 },
-    "materials": { "red clay": { "type": "diffuse", "albedo": [0.8, 0.2, 0.1] }, "chalk": { "type": "diffuse", "albedo": 0.8 } },
+    "materials": { "red clay": { "type": "diffuse", "albedo": [0.8, 0.2, 0.1] },
+    "chalk": { "type": "diffuse", "albedo": 0.8 } },
     "shapes": [
         { "type": "sphere", "radius": 1, "name": "равнина", "material": "red clay" },
         { "type": "mesh", "file": "wall.obj", "name": "wall", "material": "chalk" }
@@ -27,9 +28,10 @@ const SCENE: &str = r#"{
 
 const WALL: &str = "v -1 -1 -2\nv 1 -1 -2\nv 1 2 -2\nv -1 2 -2\nf 1 2 3 4\n";
 
-const ALL_LAYERS: &str = "Z,N,Ng,P,uv,motion,albedo,diffuse_direct,diffuse_indirect,specular_direct,specular_indirect,transmission_direct,\
-transmission_indirect,emission,background,light_groups,variance,samples,feature_albedo,feature_normal,object_id,material_id,instance_id,\
-crypto_object,crypto_material,crypto_asset";
+const ALL_LAYERS: &str = "Z,N,Ng,P,uv,motion,albedo,diffuse_direct,diffuse_indirect,specular_direct,specular_indirect,\
+                          transmission_direct,transmission_indirect,emission,background,light_groups,variance,samples,\
+                          feature_albedo,feature_normal,object_id,material_id,instance_id,crypto_object,\
+                          crypto_material,crypto_asset";
 
 const PROFILES: [&str; 4] = ["default", "nuke", "blender", "multipart"];
 
@@ -57,10 +59,20 @@ fn text(bytes: &[u8]) -> String {
 
 /// All channels of all parts: part, name, samples.
 fn channels(path: &Path) -> Vec<(usize, String, FlatSamples)> {
-    let file: FlatImage =
-        read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes().from_file(path).unwrap();
+    let file: FlatImage = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .from_file(path)
+        .unwrap();
     let parts = file.layer_data.into_iter().enumerate();
-    parts.flat_map(|(part, layer)| layer.channel_data.list.into_iter().map(move |c| (part, c.name.to_string(), c.sample_data))).collect()
+    parts
+        .flat_map(|(part, layer)| {
+            layer.channel_data.list.into_iter().map(move |c| (part, c.name.to_string(), c.sample_data))
+        })
+        .collect()
 }
 
 fn values(path: &Path, name: &str) -> Vec<f32> {
@@ -73,7 +85,12 @@ fn values(path: &Path, name: &str) -> Vec<f32> {
 fn render_profiles(dir: &Path) {
     for profile in PROFILES {
         let extra = if profile == "multipart" { " --compression dwaa --crypto-manifest sidecar" } else { "" };
-        run_ok(dir, &format!("render scene.json -q -o {profile}.exr --spp 4 --layers {ALL_LAYERS} --exr-profile {profile}{extra}"));
+        run_ok(
+            dir,
+            &format!(
+                "render scene.json -q -o {profile}.exr --spp 4 --layers {ALL_LAYERS} --exr-profile {profile}{extra}"
+            ),
+        );
     }
 }
 
@@ -109,7 +126,8 @@ fn other_programs_read_every_profile() {
         }
     }
     // R, G, B, A, Z first: alpha is channel 3, depth channel 4.
-    let info = text(&Command::new("oiiotool").args(["--info", "-v"]).arg(dir.join("default.exr")).output().unwrap().stdout);
+    let info =
+        text(&Command::new("oiiotool").args(["--info", "-v"]).arg(dir.join("default.exr")).output().unwrap().stdout);
     let list = info.lines().find_map(|line| line.trim().strip_prefix("channel list: ")).unwrap_or_default();
     assert!(list.starts_with("R (half), G (half), B (half), A (half), Z"), "{list}");
     assert!(list.contains("N.X (half), N.Y (half), N.Z (half)") && list.contains("light_key_light.R"), "{list}");
@@ -127,9 +145,13 @@ fn other_programs_read_every_profile() {
 fn mattes_cover_what_they_name() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
-    run_ok(folder.path(), "render scene.json -q -o a.exr --float --layers crypto_object,crypto_material,object_id --transparent");
+    run_ok(
+        folder.path(),
+        "render scene.json -q -o a.exr --float --layers crypto_object,crypto_material,object_id --transparent",
+    );
     let alpha = values(&path, "A");
-    let planes: Vec<Vec<f32>> = (0..12).map(|i| values(&path, &cryptomatte::channel_name("CryptoObject", i / 4, i % 4))).collect();
+    let planes: Vec<Vec<f32>> =
+        (0..12).map(|i| values(&path, &cryptomatte::channel_name("CryptoObject", i / 4, i % 4))).collect();
     let matte = |name: &str, pixel: usize| -> f32 {
         planes.chunks_exact(2).filter(|pair| pair[0][pixel] == cryptomatte::id(name)).map(|pair| pair[1][pixel]).sum()
     };
@@ -170,7 +192,8 @@ fn windows_are_those_of_crops_and_overscan() {
 fn a_file_is_rendered_again() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
-    let options = "--spp 5 --seed 7 --crop 3,4,30,20 --max-depth 3 --layers Z,albedo,crypto_object --float --crypto-depth 4";
+    let options =
+        "--spp 5 --seed 7 --crop 3,4,30,20 --max-depth 3 --layers Z,albedo,crypto_object --float --crypto-depth 4";
     run_ok(dir, &format!("render scene.json -q -o a.exr -o a.png --json stats.json --threads 2 {options}"));
     let quiet = run(dir, "rerender a.exr -o b.exr -q --threads 1");
     assert!(quiet.status.success() && quiet.stderr.is_empty() && quiet.stdout.is_empty(), "{}", text(&quiet.stderr));
@@ -183,7 +206,11 @@ fn a_file_is_rendered_again() {
     std::fs::write(dir.join("wall.obj"), WALL.replace("v 1 2 -2", "v 1 1 -2")).unwrap();
     let refused = run(dir, "rerender a.exr -o c.exr -q");
     assert_eq!(refused.status.code(), Some(6), "{}", text(&refused.stderr));
-    assert!(text(&refused.stderr).contains("wall.obj") && text(&refused.stderr).contains("--allow-changed"), "{}", text(&refused.stderr));
+    assert!(
+        text(&refused.stderr).contains("wall.obj") && text(&refused.stderr).contains("--allow-changed"),
+        "{}",
+        text(&refused.stderr)
+    );
     assert!(!dir.join("c.exr").exists());
     run_ok(dir, "rerender a.exr -o c.exr -q --allow-changed");
     assert_ne!(channels(&dir.join("a.exr")), channels(&dir.join("c.exr")));
@@ -236,7 +263,11 @@ fn checks_have_their_exit_codes() {
         assert_eq!(output.status.code(), Some(code), "{arguments}: {}{}", text(&output.stdout), text(&output.stderr));
     }
     let many = text(&run(dir, "check-exr error.exr a.exr error.exr a.exr").stdout);
-    assert!(many.starts_with("2 files: clean") && many.contains("error matrix-rows: 2 times in 1 of 4 files\n    error.exr:"), "{many}");
+    assert!(
+        many.starts_with("2 files: clean")
+            && many.contains("error matrix-rows: 2 times in 1 of 4 files\n    error.exr:"),
+        "{many}"
+    );
     let json: Value = serde_json::from_str(&run_ok(dir, "check-exr warning.exr --json")).unwrap();
     assert_eq!(json[0]["findings"][0]["rule"], "color-id");
     assert_eq!(json[0]["findings"][0]["severity"], "warning");

@@ -96,7 +96,10 @@ fn a_job_is_submitted_as_arrays_and_the_merges_that_wait_for_them() {
     assert_eq!(lines[0], format!("sbatch --parsable --array=1-3 {folder}/room.farm/render.sh 7"));
     assert_eq!(
         lines[1],
-        format!("sbatch --parsable --dependency=afterok:41 --kill-on-invalid-dep=yes {folder}/room.farm/merge.sh 7 {folder}/out.0007.exr")
+        format!(
+            "sbatch --parsable --dependency=afterok:41 --kill-on-invalid-dep=yes {folder}/room.farm/merge.sh 7 \
+             {folder}/out.0007.exr"
+        )
     );
     // What is there is not submitted again.
     farm.write("out.0007.exr", "");
@@ -115,12 +118,14 @@ fn a_task_renders_its_shard_and_the_merge_takes_all_of_them() {
     assert_eq!(
         calls,
         format!(
-            "render {folder}/room.json --frames=7 --layers Z,N --shard 2/2 -o {folder}/room.farm/shards/frame#.2-of-2.shard \
-             --checkpoint {folder}/room.farm/shards/frame#.2-of-2.checkpoint --every 5 --resume --progress plain\n"
+            "render {folder}/room.json --frames=7 --layers Z,N --shard 2/2 -o \
+             {folder}/room.farm/shards/frame#.2-of-2.shard --checkpoint \
+             {folder}/room.farm/shards/frame#.2-of-2.checkpoint --every 5 --resume --progress plain\n"
         )
     );
     // Such options exist: all but those of shards, which the render has in its own words.
-    let parts: Vec<&str> = calls.split_whitespace().filter(|word| ["--frames=7", "--progress", "plain"].contains(word)).collect();
+    let parts: Vec<&str> =
+        calls.split_whitespace().filter(|word| ["--frames=7", "--progress", "plain"].contains(word)).collect();
     assert_eq!(parts.len(), 3);
     // Complete already: nothing to do.
     assert!(farm.task("7").status().unwrap().success());
@@ -129,7 +134,10 @@ fn a_task_renders_its_shard_and_the_merge_takes_all_of_them() {
     farm.write("room.farm/shards/frame7.1-of-2.shard", "");
     let merge = || farm.command("bash").args(["room.farm/merge.sh", "7", "/a b/out.exr"]).status().unwrap();
     assert!(merge().success());
-    assert_eq!(farm.calls(), format!("merge {folder}/room.farm/shards/frame7.1-of-2.shard {part}.shard -o /a b/out.exr\n"));
+    assert_eq!(
+        farm.calls(),
+        format!("merge {folder}/room.farm/shards/frame7.1-of-2.shard {part}.shard -o /a b/out.exr\n")
+    );
     assert!(!Path::new(&format!("{part}.shard")).exists());
     // Started again after it was done.
     assert!(merge().success());
@@ -152,7 +160,9 @@ fn a_failure_is_tried_again_if_that_may_help_and_not_for_ever() {
 
 #[test]
 fn a_task_that_must_leave_keeps_its_state_and_comes_back() {
-    for (state, signal, back) in [("RUNNING", Signal::USR1, true), ("PREEMPTED", Signal::TERM, true), ("CANCELLED", Signal::TERM, false)] {
+    for (state, signal, back) in
+        [("RUNNING", Signal::USR1, true), ("PREEMPTED", Signal::TERM, true), ("CANCELLED", Signal::TERM, false)]
+    {
         let farm = Farm::new();
         farm.job("--shards 2");
         farm.write("behaviour", "sleep");
@@ -187,7 +197,12 @@ fn what_would_fail_on_every_node_is_refused_at_once() {
         for kind in ["slurm", "openjd"] {
             let output = farm.steradian(&format!("farm {kind} {arguments}"));
             let expected = if kind == "openjd" && code == 5 { 0 } else { code };
-            assert_eq!(output.status.code(), Some(expected), "{kind} {arguments}: {}", String::from_utf8_lossy(&output.stderr));
+            assert_eq!(
+                output.status.code(),
+                Some(expected),
+                "{kind} {arguments}: {}",
+                String::from_utf8_lossy(&output.stderr)
+            );
         }
     }
 }
@@ -198,8 +213,10 @@ fn an_openjd_template_renders_shards_and_merges_them() {
     let farm = Farm::new();
     farm.write("room.0007.json", r#"{ "camera": {} }"#);
     let render = farm.path().join("render");
-    let arguments =
-        format!("farm openjd room.####.json --program {} --shards 2 --frames 7-11x2,20 -o out/a.####.exr -o b.%02d.png", render.display());
+    let arguments = format!(
+        "farm openjd room.####.json --program {} --shards 2 --frames 7-11x2,20 -o out/a.####.exr -o b.%02d.png",
+        render.display()
+    );
     let output = farm.steradian(&arguments);
     let template: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(template["specificationVersion"], "jobtemplate-2023-09");
@@ -213,11 +230,18 @@ fn an_openjd_template_renders_shards_and_merges_them() {
     let folder = farm.path().display();
     let shards = format!("{folder}/room.farm/shards");
     let called = run(0);
-    assert!(called.contains(&format!("render {folder}/room.####.json --frames=7 --shard 1/2 -o {shards}/frame#.1-of-2.shard")), "{called}");
+    assert!(
+        called.contains(&format!(
+            "render {folder}/room.####.json --frames=7 --shard 1/2 -o {shards}/frame#.1-of-2.shard"
+        )),
+        "{called}"
+    );
     assert!(called.contains("--resume --progress openjd"));
     let called = run(1);
-    let expected =
-        format!("merge {shards}/frame7.1-of-2.shard {shards}/frame7.2-of-2.shard -o {folder}/out/a.0007.exr -o {folder}/b.07.png\n");
+    let expected = format!(
+        "merge {shards}/frame7.1-of-2.shard {shards}/frame7.2-of-2.shard -o {folder}/out/a.0007.exr -o \
+         {folder}/b.07.png\n"
+    );
     assert_eq!(called, expected);
 }
 
@@ -253,7 +277,9 @@ fn names_are_no_commands() {
     farm.write(scene, r#"{ "camera": {} }"#);
     let job = |kind: &str| {
         let mut command = farm.command(env!("CARGO_BIN_EXE_steradian"));
-        command.args(["farm", kind, scene, "--shards", "1", "-o", "a.exr", "--program"]).arg(farm.path().join("render"));
+        command
+            .args(["farm", kind, scene, "--shards", "1", "-o", "a.exr", "--program"])
+            .arg(farm.path().join("render"));
         let output = command.args(["--", "--define", "a=$(touch owned){{b}}"]).output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         output.stdout

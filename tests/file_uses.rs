@@ -24,8 +24,13 @@ fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 }
 
 fn picture(path: &Path) {
-    output::write_exr(path, &Image::of_color([2, 1], vec![0.5; 8]), &steradian::desc::OutputDesc::new("x.exr"), &Default::default())
-        .unwrap();
+    output::write_exr(
+        path,
+        &Image::of_color([2, 1], vec![0.5; 8]),
+        &steradian::desc::OutputDesc::new("x.exr"),
+        &Default::default(),
+    )
+    .unwrap();
 }
 
 /// A folder with scenes of three formats, all of their assets, pictures and a link to a scene.
@@ -34,7 +39,10 @@ fn folder() -> tempfile::TempDir {
     let dir = folder.path();
     let write = |name: &str, text: &str| std::fs::write(dir.join(name), text).unwrap();
     let sky = SCENE.replace("\"radiance\": [1, 1, 1]", "\"file\": \"studio.exr\"");
-    write("studio.json", &sky.replace("{ \"type\": \"sphere\"", "{ \"type\": \"mesh\", \"file\": \"m.obj\" }, { \"type\": \"sphere\""));
+    write(
+        "studio.json",
+        &sky.replace("{ \"type\": \"sphere\"", "{ \"type\": \"mesh\", \"file\": \"m.obj\" }, { \"type\": \"sphere\""),
+    );
     write("m.obj", "mtllib m.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     write("m.mtl", "newmtl a\nKd 0.5 0.5 0.5\n");
     write("scene.json", SCENE);
@@ -43,10 +51,14 @@ fn folder() -> tempfile::TempDir {
         r#"<scene version="3.0.0"><include filename="part.xml"/><sensor type="perspective"><film type="hdrfilm">
         <integer name="width" value="8"/><integer name="height" value="8"/></film></sensor></scene>"#,
     );
-    write("part.xml", r#"<scene version="3.0.0"><emitter type="envmap"><string name="filename" value="sky.exr"/></emitter></scene>"#);
+    write(
+        "part.xml",
+        r#"<scene version="3.0.0"><emitter type="envmap"><string name="filename" value="sky.exr"/></emitter></scene>"#,
+    );
     write(
         "s.pbrt",
-        "Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 8\nWorldBegin\nInclude \"part.pbrt\"\nShape \"sphere\"\n",
+        "Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 8\nWorldBegin\nInclude \"part.pbrt\"\n\
+         Shape \"sphere\"\n",
     );
     write("part.pbrt", "LightSource \"infinite\" \"string filename\" \"sky.exr\"\n");
     for name in ["studio.exr", "sky.exr", "noisy.exr", "ref.exr"] {
@@ -67,7 +79,11 @@ fn assert_refused(dir: &Path, arguments: &str, uses: [&str; 2]) {
     let text = stderr_of(&output);
     assert_eq!(output.status.code(), Some(2), "{arguments}: {text}");
     assert!(uses.iter().all(|part| text.contains(part)) && text.contains("choose another name"), "{arguments}: {text}");
-    let changed: Vec<_> = contents(dir).into_iter().filter(|(path, bytes)| before.get(path) != Some(bytes)).map(|(path, _)| path).collect();
+    let changed: Vec<_> = contents(dir)
+        .into_iter()
+        .filter(|(path, bytes)| before.get(path) != Some(bytes))
+        .map(|(path, _)| path)
+        .collect();
     assert!(changed.is_empty(), "{arguments}: {changed:?}");
 }
 
@@ -85,7 +101,10 @@ fn renders_overwrite_nothing_that_they_read() {
         ("render scene.json -o a.exr --json link.json", ["scene.json (the scene)", "link.json (--json)"]),
         ("render link.json -o a.exr --json sub/../scene.json", ["link.json (the scene)", "sub/../scene.json (--json)"]),
         ("render scene.json -o a.exr --log-file scene.json", ["scene.json (the scene)", "scene.json (--log-file)"]),
-        ("render scene.json -o a.exr --checkpoint scene.json --resume", ["scene.json (the scene)", "scene.json (--checkpoint)"]),
+        (
+            "render scene.json -o a.exr --checkpoint scene.json --resume",
+            ["scene.json (the scene)", "scene.json (--checkpoint)"],
+        ),
         ("render s.xml -o sky.exr", ["sky.exr", "(output)"]),
         ("render s.xml -o a.exr --json part.xml", ["part.xml (a file of the scene)", "(--json)"]),
         ("render s.pbrt -o sky.exr", ["sky.exr", "(output)"]),
@@ -136,9 +155,18 @@ fn sequences_are_checked_before_their_first_frame() {
         std::fs::write(dir.join(format!("each.{number}.json")), SCENE).unwrap();
     }
     for (arguments, uses) in [
-        ("render studio.json --frames 1-3 -o s.####.exr --overwrite", ["s.0003.exr (lights[0].file)", "s.0003.exr (output)"]),
-        ("render scene.json --frames 1-3 -o s.exr -o s.%04d.exr --overwrite", ["s.0001.exr (output)", "s.0001.exr (output)"]),
-        ("render each.#.json --frames 1-3 -o a.####.exr --json each.3.json", ["each.3.json (the scene)", "each.3.json (--json)"]),
+        (
+            "render studio.json --frames 1-3 -o s.####.exr --overwrite",
+            ["s.0003.exr (lights[0].file)", "s.0003.exr (output)"],
+        ),
+        (
+            "render scene.json --frames 1-3 -o s.exr -o s.%04d.exr --overwrite",
+            ["s.0001.exr (output)", "s.0001.exr (output)"],
+        ),
+        (
+            "render each.#.json --frames 1-3 -o a.####.exr --json each.3.json",
+            ["each.3.json (the scene)", "each.3.json (--json)"],
+        ),
         ("render scene.json --frames 1-3 -o s.####.exr --overwrite --checkpoint s.exr", ["(output)", "(--checkpoint)"]),
     ] {
         assert_refused(dir, arguments, uses);
@@ -158,8 +186,14 @@ fn other_commands_overwrite_nothing_that_they_read() {
     let shards = "scene.1-of-2.shard scene.2-of-2.shard";
     for (arguments, uses) in [
         ("rerender kept.exr -o kept.exr".to_owned(), ["(the picture to render again)", "(--output)"]),
-        ("rerender kept.exr -o o.exr --scene scene.json --log-file scene.json".to_owned(), ["(the scene)", "(--log-file)"]),
-        ("rerender noisy.exr -o studio.exr --log-file noisy.exr".to_owned(), ["(the picture to render again)", "(--log-file)"]),
+        (
+            "rerender kept.exr -o o.exr --scene scene.json --log-file scene.json".to_owned(),
+            ["(the scene)", "(--log-file)"],
+        ),
+        (
+            "rerender noisy.exr -o studio.exr --log-file noisy.exr".to_owned(),
+            ["(the picture to render again)", "(--log-file)"],
+        ),
         ("convert scene.json scene.json".to_owned(), ["(the scene)", "(the converted scene)"]),
         ("convert scene.json link.json".to_owned(), ["scene.json (the scene)", "link.json (the converted scene)"]),
         ("convert s.xml o.json --report o.json".to_owned(), ["(the converted scene)", "(--report)"]),
@@ -178,11 +212,19 @@ fn other_commands_overwrite_nothing_that_they_read() {
     assert_refused(dir, "bench accel accel.json --out .", ["accel.json (the scene)", "accel.json (--out)"]);
     assert_refused(dir, "bench error error.json --out .", ["error.json (the scene)", "error.json (--out)"]);
     std::fs::copy(dir.join("scene.json"), dir.join("submit.sh")).unwrap();
-    assert_refused(dir, "farm slurm submit.sh --shards 2 -o o.exr --dir .", ["submit.sh (the scene)", "(a script of the job)"]);
+    assert_refused(
+        dir,
+        "farm slurm submit.sh --shards 2 -o o.exr --dir .",
+        ["submit.sh (the scene)", "(a script of the job)"],
+    );
     // The frames of a sequence are compared by their numbers.
     std::fs::copy(dir.join("noisy.exr"), dir.join("f.0001.exr")).unwrap();
     assert_refused(dir, "denoise f.####.exr f.####.exr", ["(the noisy picture)", "(the denoised picture)"]);
-    assert_refused(dir, "denoise f.####.exr f.0###.exr", ["f.0001.exr (a noisy picture)", "f.0001.exr (a denoised picture)"]);
+    assert_refused(
+        dir,
+        "denoise f.####.exr f.0###.exr",
+        ["f.0001.exr (a noisy picture)", "f.0001.exr (a denoised picture)"],
+    );
 }
 
 /// Files that a conversion copies beside the scene are compared before the first is written.
@@ -195,9 +237,14 @@ fn conversions_overwrite_no_file_that_they_copy() {
     for (name, byte) in [("a_files/t.png", 10), ("t.png", 200)] {
         image::GrayImage::from_pixel(2, 2, image::Luma([byte])).save(dir.join(name)).unwrap();
     }
-    let textures = r#""textures": { "a": { "type": "image", "file": "t.png" }, "b": { "type": "image", "file": "a_files/t.png" } },"#;
+    let textures = r#""textures": { "a": { "type": "image", "file": "t.png" },
+        "b": { "type": "image", "file": "a_files/t.png" } },"#;
     std::fs::write(dir.join("src.json"), SCENE.replacen('{', &format!("{{ {textures}"), 1)).unwrap();
-    assert_refused(dir, "convert src.json a.json", ["a_files/t.png (textures.b.file)", "a_files/t.png (a copy of textures.a.file)"]);
+    assert_refused(
+        dir,
+        "convert src.json a.json",
+        ["a_files/t.png (textures.b.file)", "a_files/t.png (a copy of textures.a.file)"],
+    );
     // Under another name all are copied, and what lies at its place stays.
     assert!(run(dir, "convert src.json b.json").status.success());
     let [a, b] = ["b_files/t.png", "b_files/t_2.png"].map(|name| std::fs::read(dir.join(name)).unwrap());
@@ -217,12 +264,17 @@ fn messages_are_added_to_logs_alone() {
         let before = contents(dir);
         let output = run(dir, &format!("render studio.json -o a.exr --log-file {name}"));
         assert_eq!(output.status.code(), Some(2), "{name}");
-        assert!(stderr_of(&output).contains("--log-file") && stderr_of(&output).contains(name), "{}", stderr_of(&output));
+        assert!(
+            stderr_of(&output).contains("--log-file") && stderr_of(&output).contains(name),
+            "{}",
+            stderr_of(&output)
+        );
         assert_eq!(contents(dir)[&dir.join(name)], before[&dir.join(name)]);
     }
     for format in ["text", "json"] {
         for _ in 0..3 {
-            let output = run(dir, &format!("render scene.json -q -o n.exr --log-file {format}.log --log-format {format}"));
+            let output =
+                run(dir, &format!("render scene.json -q -o n.exr --log-file {format}.log --log-format {format}"));
             assert!(output.status.success(), "{}", stderr_of(&output));
         }
     }

@@ -13,7 +13,10 @@ fn symmetric(size: [u32; 2], filter: Value) -> Value {
         "sampler": { "spp": 4096 },
         "camera": { "position": [0, 0, 4], "look_at": [0, 0, 0], "vertical_fov_degrees": 40 },
         "integrator": { "type": "path", "max_depth": 1 },
-        "shapes": [{ "type": "quad", "origin": [-0.6, -0.6, 0], "edge_u": [1.2, 0, 0], "edge_v": [0, 1.2, 0], "emission": { "radiance": [1, 1, 1] } }]
+        "shapes": [{
+            "type": "quad", "origin": [-0.6, -0.6, 0], "edge_u": [1.2, 0, 0], "edge_v": [0, 1.2, 0],
+            "emission": { "radiance": [1, 1, 1] }
+        }]
     })
 }
 
@@ -37,7 +40,12 @@ fn centroid(image: &Image) -> [f64; 2] {
 #[test]
 fn the_tent_filter_does_not_shift_the_picture_by_a_quarter_pixel() {
     // An offset that lacks half a pixel moves the picture by 1/4; the centroid of the symmetric scene shows it.
-    for filter in [json!({ "type": "tent" }), json!({ "type": "box" }), json!({ "type": "gaussian" }), json!({ "type": "mitchell" })] {
+    for filter in [
+        json!({ "type": "tent" }),
+        json!({ "type": "box" }),
+        json!({ "type": "gaussian" }),
+        json!({ "type": "mitchell" }),
+    ] {
         let [x, y] = centroid(&render(&symmetric([16, 16], filter.clone())));
         assert!((x - 8.0).abs() < 5e-3 && (y - 8.0).abs() < 5e-3, "{filter}: {x} {y}");
     }
@@ -53,7 +61,11 @@ fn bright_samples_are_not_clamped_before_the_mean() {
     scene["shapes"][0]["emission"]["radiance"] = json!([100, 100, 100]);
     scene["film"]["width"] = json!(9);
     let image = render(&scene);
-    assert!((brightness(&image, 4, 3) - 50.0).abs() < 0.5 && brightness(&image, 5, 3) == 100.0 && brightness(&image, 3, 3) == 0.0);
+    assert!(
+        (brightness(&image, 4, 3) - 50.0).abs() < 0.5
+            && brightness(&image, 5, 3) == 100.0
+            && brightness(&image, 3, 3) == 0.0
+    );
 }
 
 #[test]
@@ -75,7 +87,10 @@ fn the_lens_is_sampled_by_area_and_not_by_radius() {
     let scene = json!({
         "film": { "width": 32, "height": 32, "filter": { "type": "box" } },
         "sampler": { "spp": 1024 },
-        "camera": { "position": [0, 0, 1], "look_at": [0, 0, 0], "vertical_fov_degrees": 40, "lens": { "radius": 0.25, "focus_distance": 1e6 } },
+        "camera": {
+            "position": [0, 0, 1], "look_at": [0, 0, 0], "vertical_fov_degrees": 40,
+            "lens": { "radius": 0.25, "focus_distance": 1e6 }
+        },
         "integrator": { "type": "path", "max_depth": 1 },
         "shapes": [{ "type": "sphere", "radius": 0.02, "emission": { "radiance": [1, 1, 1] } }]
     });

@@ -11,8 +11,15 @@ use crate::util::geometry::{Rng, all_analytic_shapes, transform};
 use crate::util::render::{pixels, render};
 
 /// A ball of unit radius as two Bezier curves, which leave the sphere by up to 2.8e-4.
-const BALL: [[f64; 2]; 7] =
-    [[0.0, -1.0], [0.552_284_749_8, -1.0], [1.0, -0.552_284_749_8], [1.0, 0.0], [1.0, 0.552_284_749_8], [0.552_284_749_8, 1.0], [0.0, 1.0]];
+const BALL: [[f64; 2]; 7] = [
+    [0.0, -1.0],
+    [0.552_284_749_8, -1.0],
+    [1.0, -0.552_284_749_8],
+    [1.0, 0.0],
+    [1.0, 0.552_284_749_8],
+    [0.552_284_749_8, 1.0],
+    [0.0, 1.0],
+];
 
 fn ball() -> Revolution {
     Revolution::new(&Profile::bezier(&BALL).unwrap(), TAU).unwrap()
@@ -65,7 +72,9 @@ fn a_surface_of_revolution_hides_only_what_is_behind_it() {
     // Three lamps one behind the other, listed in every order: always the nearest is seen, the turned one first, in the
     // middle and last.
     let revolution = lamp(json!({ "type": "revolution", "profile": { "bezier": BALL } }), 1.0);
-    let quad = |z: f64, radiance: f64| lamp(json!({ "type": "quad", "transform": [{ "scale": 3 }, { "translate": [0, 0, z] }] }), radiance);
+    let quad = |z: f64, radiance: f64| {
+        lamp(json!({ "type": "quad", "transform": [{ "scale": 3 }, { "translate": [0, 0, z] }] }), radiance)
+    };
     let camera = json!({ "position": [0, 0, 9], "look_at": [0, 0, 0], "vertical_fov_degrees": 1 });
     for (z, expected) in [([-3.0, -5.0], 1.0), ([3.0, -3.0], 2.0), ([3.0, 5.0], 3.0)] {
         let shapes = [revolution.clone(), quad(z[0], 2.0), quad(z[1], 3.0)];
@@ -79,7 +88,8 @@ fn a_surface_of_revolution_hides_only_what_is_behind_it() {
 #[test]
 fn level_rays_meet_a_surface_of_revolution_on_both_sides() {
     // A solver that divides by the height of the direction gets infinities; the outline of a cylinder is its width.
-    let column = lamp(json!({ "type": "revolution", "profile": { "bezier": [[1, -2], [1, -1], [1, 1], [1, 2]] } }), 1.0);
+    let column =
+        lamp(json!({ "type": "revolution", "profile": { "bezier": [[1, -2], [1, -1], [1, 1], [1, 2]] } }), 1.0);
     let camera = json!({ "type": "orthographic", "position": [0, 0, 9], "look_at": [0, 0, 0], "view_height": 4 });
     let image = emission_only(json!([column]), camera);
     for (i, p) in pixels(&image).enumerate() {
@@ -93,7 +103,8 @@ fn level_rays_meet_a_surface_of_revolution_on_both_sides() {
 fn a_b_spline_is_there_between_its_ends_and_nowhere_else() {
     // Four control points on a line: of y from 0 to 3 the curve reaches from 1 to 2. A parameter out of its domain
     // shows more or less.
-    let spline = Revolution::new(&Profile::b_spline(&[[1.0, 0.0], [1.0, 1.0], [1.0, 2.0], [1.0, 3.0]]).unwrap(), TAU).unwrap();
+    let spline =
+        Revolution::new(&Profile::b_spline(&[[1.0, 0.0], [1.0, 1.0], [1.0, 2.0], [1.0, 3.0]]).unwrap(), TAU).unwrap();
     for i in 0..=300 {
         let y = 0.01 * f64::from(i) + 0.005;
         for dy in [0.0, 1e-9] {
@@ -113,7 +124,10 @@ fn exact_zeros_of_a_profile_are_hits() {
     for direction in [DVec3::Y, -DVec3::Y, DVec3::X, -DVec3::Z] {
         let outside = ball.intersect(&endless(-2.0 * direction, direction)).unwrap();
         let inside = ball.intersect(&endless(DVec3::ZERO, direction)).unwrap();
-        assert!((outside.t - 1.0).abs() < 1e-12 && (inside.t - 1.0).abs() < 1e-12, "{direction}: {outside:?} {inside:?}");
+        assert!(
+            (outside.t - 1.0).abs() < 1e-12 && (inside.t - 1.0).abs() < 1e-12,
+            "{direction}: {outside:?} {inside:?}"
+        );
         // From the surface itself, inward and outward.
         let from_surface = ball.intersect(&RayF64 { t_min: 1e-9, ..endless(-direction, direction) }).unwrap();
         assert!((from_surface.t - 2.0).abs() < 1e-12, "{direction}: {from_surface:?}");
@@ -124,7 +138,12 @@ fn exact_zeros_of_a_profile_are_hits() {
 fn glass_ball(shape: Value) -> Image {
     let mut shape = shape;
     shape["material"] = json!("glass");
-    let half = |x: f64, radiance: [f64; 3]| json!({ "type": "quad", "origin": [x, -9, -6], "edge_u": [9, 0, 0], "edge_v": [0, 18, 0], "material": "black", "emission": { "radiance": radiance } });
+    let half = |x: f64, radiance: [f64; 3]| {
+        json!({
+            "type": "quad", "origin": [x, -9, -6], "edge_u": [9, 0, 0], "edge_v": [0, 18, 0], "material": "black",
+            "emission": { "radiance": radiance }
+        })
+    };
     render(&json!({
         "film": { "width": 24, "height": 24, "filter": { "type": "box" } },
         "camera": { "position": [0, 0, 8], "look_at": [0, 0, 0], "vertical_fov_degrees": 17 },
@@ -170,7 +189,10 @@ fn whitteds_glass_divides_light_by_fresnels_equations_and_loses_none() {
     let sphere = scene(camera, json!({ "type": "sphere", "material": "glass", "radius": 0.9 }));
     // After 12 segments 1 - (1 - R) R¹⁰ has come back, at least 0.9649 (where R = 10 / 11, near the rim) and all of it
     // in the middle.
-    assert!(pixels(&sphere).all(|p| p[1] > 0.9649 && p[1] < 1.0 + 1e-5) && (sphere.rgb(6, 6).unwrap()[1] - 1.0).abs() < 1e-5);
+    assert!(
+        pixels(&sphere).all(|p| p[1] > 0.9649 && p[1] < 1.0 + 1e-5)
+            && (sphere.rgb(6, 6).unwrap()[1] - 1.0).abs() < 1e-5
+    );
     // Square onto one leg of a prism of 45 degrees: light is reflected totally at its back, which must not be black,
     // and leaves by the other leg. What goes round more than twice is below R⁴.
     let prism = json!({ "type": "mesh", "material": "glass",
@@ -220,9 +242,18 @@ fn a_scale_acts_on_every_shape_as_its_measures_do() {
     // Where a scale moves the box but not the hit, or the centre but not the radius, the two pictures differ.
     let cases = [
         (json!({ "type": "sphere", "radius": 0.5 }), json!({ "type": "sphere", "radius": 1.0 })),
-        (json!({ "type": "disk", "radius": 0.5, "inner_radius": 0.2 }), json!({ "type": "disk", "radius": 1.0, "inner_radius": 0.4 })),
-        (json!({ "type": "cylinder", "radius": 0.5, "height": 0.4 }), json!({ "type": "cylinder", "radius": 1.0, "height": 0.8 })),
-        (json!({ "type": "cone", "radius": 0.5, "height": 0.6 }), json!({ "type": "cone", "radius": 1.0, "height": 1.2 })),
+        (
+            json!({ "type": "disk", "radius": 0.5, "inner_radius": 0.2 }),
+            json!({ "type": "disk", "radius": 1.0, "inner_radius": 0.4 }),
+        ),
+        (
+            json!({ "type": "cylinder", "radius": 0.5, "height": 0.4 }),
+            json!({ "type": "cylinder", "radius": 1.0, "height": 0.8 }),
+        ),
+        (
+            json!({ "type": "cone", "radius": 0.5, "height": 0.6 }),
+            json!({ "type": "cone", "radius": 1.0, "height": 1.2 }),
+        ),
         (
             json!({ "type": "quad", "origin": [0, 0, 0], "edge_u": [0.5, 0, 0.2], "edge_v": [0, 0.5, 0] }),
             json!({ "type": "quad", "origin": [0, 0, 0], "edge_u": [1, 0, 0.4], "edge_v": [0, 1, 0] }),
@@ -290,7 +321,10 @@ fn paths_between_facing_mirrors_end() {
             "shapes": [
                 { "type": "quad", "material": "mirror", "transform": [{ "scale": 99 }, { "translate": [0, 0, 2] }] },
                 { "type": "quad", "material": "mirror", "transform": [{ "scale": 99 }, { "translate": [0, 0, -2] }] },
-                { "type": "sphere", "radius": 0.01, "transform": [{ "translate": [50, 50, 0] }], "emission": { "radiance": [1, 1, 1] } }
+                {
+                    "type": "sphere", "radius": 0.01, "transform": [{ "translate": [50, 50, 0] }],
+                    "emission": { "radiance": [1, 1, 1] }
+                }
             ]
         }));
         assert!(pixels(&image).all(|p| p.iter().all(|c| c.is_finite())), "{integrator}");

@@ -8,7 +8,10 @@ use crate::util::folder::Folder;
 use crate::util::render::{AssertIs, Estimate, assert_irradiance, floor_probe, pixels, probe, render};
 
 fn sphere(center: [f64; 3], radius: f64) -> Value {
-    json!({ "type": "sphere", "radius": radius, "material": "black", "emission": { "radiance": [1, 1, 1] }, "transform": [{ "translate": center }] })
+    json!({
+        "type": "sphere", "radius": radius, "material": "black", "emission": { "radiance": [1, 1, 1] },
+        "transform": [{ "translate": center }]
+    })
 }
 
 /// Irradiance on the floor by sampling lights alone, which has no noise from point-like lights.
@@ -50,7 +53,10 @@ fn the_solid_angle_of_a_far_sphere_does_not_cancel_to_zero() {
 fn directional_light_is_shadowed_and_given_as_irradiance() {
     let sun = json!([{ "type": "directional", "direction": [0, -1, 0], "irradiance": [2, 2, 2] }]);
     assert_exact(&with_lights(floor_probe([0.0; 3], json!([])), sun.clone()), 2.0, "open");
-    let roof = json!([{ "type": "disk", "radius": 0.3, "material": "black", "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": 90 } }, { "translate": [0, 3, 0] }] }]);
+    let roof = json!([{
+        "type": "disk", "radius": 0.3, "material": "black",
+        "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": 90 } }, { "translate": [0, 3, 0] }]
+    }]);
     let shadowed = render(&with_lights(floor_probe([0.0; 3], roof), sun));
     assert!(pixels(&shadowed).all(|p| p == [0.0; 3]));
 }
@@ -75,7 +81,12 @@ fn no_light_is_found_by_a_tolerance_that_depends_on_the_scale() {
             "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": 90 } }, { "translate": [0, 0.4 * scale, 0] }] });
         let mut scene = floor_probe([0.0; 3], json!([lamp]));
         for key in ["position", "look_at"] {
-            let scaled = scene["camera"][key].as_array().unwrap().iter().map(|x| x.as_f64().unwrap() * scale).collect::<Vec<_>>();
+            let scaled = scene["camera"][key]
+                .as_array()
+                .unwrap()
+                .iter()
+                .map(|x| x.as_f64().unwrap() * scale)
+                .collect::<Vec<_>>();
             scene["camera"][key] = json!(scaled);
         }
         assert_irradiance(&scene, PI / 16.0, &format!("scale {scale}"));
@@ -87,7 +98,10 @@ fn no_light_is_found_by_a_tolerance_that_depends_on_the_scale() {
 
 #[test]
 fn lights_shine_in_mirrors_and_through_glass() {
-    let lamp = json!({ "type": "quad", "material": "black", "emission": { "radiance": [3, 2, 1] }, "origin": [-5, -5, 9], "edge_u": [10, 0, 0], "edge_v": [0, 10, 0], "reverse_normal": true });
+    let lamp = json!({
+        "type": "quad", "material": "black", "emission": { "radiance": [3, 2, 1] }, "origin": [-5, -5, 9],
+        "edge_u": [10, 0, 0], "edge_v": [0, 10, 0], "reverse_normal": true
+    });
     for (material, factor) in [
         (json!({ "type": "mirror", "reflectance": 0.5 }), 0.5),
         (json!({ "type": "conductor", "metal": "silver", "tint": [0, 0, 0] }), 0.0),
@@ -95,18 +109,30 @@ fn lights_shine_in_mirrors_and_through_glass() {
         let scene = probe(
             [0.0, 0.0, 3.0],
             [0.0; 3],
-            json!({ "sampler": { "spp": 16 }, "integrator": { "type": "path", "max_depth": 3 }, "materials": { "m": material, "black": { "type": "diffuse", "albedo": 0 } },
-                    "shapes": [{ "type": "quad", "material": "m" }, lamp] }),
+            json!({
+                "sampler": { "spp": 16 }, "integrator": { "type": "path", "max_depth": 3 },
+                "materials": { "m": material, "black": { "type": "diffuse", "albedo": 0 } },
+                "shapes": [{ "type": "quad", "material": "m" }, lamp]
+            }),
         );
-        assert!(pixels(&render(&scene)).all(|p| (p[0] - 3.0 * factor).abs() < 1e-5 && (p[2] - factor).abs() < 1e-5), "{factor}");
+        assert!(
+            pixels(&render(&scene)).all(|p| (p[0] - 3.0 * factor).abs() < 1e-5 && (p[2] - factor).abs() < 1e-5),
+            "{factor}"
+        );
     }
 }
 
 #[test]
 fn a_light_below_the_surface_or_turned_away_gives_nothing() {
     // The product of two negative cosines is positive.
-    let below = json!({ "type": "quad", "material": "black", "emission": { "radiance": [1, 1, 1] }, "origin": [-1, -2, 1], "edge_u": [2, 0, 0], "edge_v": [0, 0, -2], "reverse_normal": true });
-    let away = json!({ "type": "quad", "material": "black", "emission": { "radiance": [1, 1, 1] }, "origin": [-1, 2, 1], "edge_u": [2, 0, 0], "edge_v": [0, 0, -2] });
+    let below = json!({
+        "type": "quad", "material": "black", "emission": { "radiance": [1, 1, 1] }, "origin": [-1, -2, 1],
+        "edge_u": [2, 0, 0], "edge_v": [0, 0, -2], "reverse_normal": true
+    });
+    let away = json!({
+        "type": "quad", "material": "black", "emission": { "radiance": [1, 1, 1] }, "origin": [-1, 2, 1],
+        "edge_u": [2, 0, 0], "edge_v": [0, 0, -2]
+    });
     for lamp in [below, away] {
         for strategy in ["mis", "light", "bsdf"] {
             let mut scene = floor_probe([0.0; 3], json!([lamp]));
@@ -121,11 +147,16 @@ fn a_light_below_the_surface_or_turned_away_gives_nothing() {
 fn a_light_across_the_horizon_is_cut_there_and_never_negative() {
     // A wall from 1 below to 1 above the floor's plane at distance 2: only the upper half gives light (Lambert's
     // polygon, clipped).
-    let wall = json!({ "type": "quad", "material": "black", "emission": { "radiance": [1, 1, 1] }, "origin": [2, -1, -1.5], "edge_u": [0, 0, 3], "edge_v": [0, 2, 0] });
+    let wall = json!({
+        "type": "quad", "material": "black", "emission": { "radiance": [1, 1, 1] }, "origin": [2, -1, -1.5],
+        "edge_u": [0, 0, 3], "edge_v": [0, 2, 0]
+    });
     let mut scene = floor_probe([0.0; 3], json!([wall]));
     // Without the floor in front of the wall nothing else would cut it.
-    scene["shapes"][0] =
-        json!({ "type": "disk", "radius": 0.05, "material": "white", "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": -90 } }] });
+    scene["shapes"][0] = json!({
+        "type": "disk", "radius": 0.05, "material": "white",
+        "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": -90 } }]
+    });
     let strip = |height: f64| (1.5 / (4.0f64 + height * height).sqrt()).atan() / (4.0 + height * height).sqrt() * 2.0;
     // Irradiance of a vertical strip seen along its normal: E = (atan(w/d) - d / sqrt(d² + h²) atan(w / sqrt(d² + h²)))
     // for half-width w.
@@ -137,7 +168,12 @@ fn a_light_across_the_horizon_is_cut_there_and_never_negative() {
 #[test]
 fn each_area_light_has_an_area_of_its_own() {
     // A small and a large quad at once: one that is sampled with the other's area is wrong by their ratio.
-    let quad = |half: f64, x: f64| json!({ "type": "quad", "material": "black", "emission": { "radiance": [1, 1, 1] }, "origin": [x - half, 1, -half], "edge_u": [2.0 * half, 0, 0], "edge_v": [0, 0, 2.0 * half] });
+    let quad = |half: f64, x: f64| {
+        json!({
+            "type": "quad", "material": "black", "emission": { "radiance": [1, 1, 1] }, "origin": [x - half, 1, -half],
+            "edge_u": [2.0 * half, 0, 0], "edge_v": [0, 0, 2.0 * half]
+        })
+    };
     // Above the corner of a rectangle a x b at height 1: E = 1/2 (a/sqrt(1+a²) atan(b/sqrt(1+a²)) + b/sqrt(1+b²)
     // atan(a/sqrt(1+b²))).
     let corner = |a: f64, b: f64| {
@@ -171,20 +207,25 @@ fn environments_of_several_sizes_are_right_at_the_pole_and_across_the_seam() {
             let theta = (f64::from(j) + 0.5) / f64::from(n) * PI;
             let mut row = 0.0;
             for i in 0..n {
-                let (x, y) = ((f64::from(i) + 0.5) / f64::from(n) * size[0] as f64 - 0.5, theta / PI * size[1] as f64 - 0.5);
+                let (x, y) =
+                    ((f64::from(i) + 0.5) / f64::from(n) * size[0] as f64 - 0.5, theta / PI * size[1] as f64 - 0.5);
                 let (fx, fy) = (x - x.floor(), y - y.floor());
                 let at = |dx: i64, dy: i64| {
                     let column = (x.floor() as i64 + dx).rem_euclid(size[0] as i64) as usize;
                     f64::from(texel(column, (y.floor() as i64 + dy).clamp(0, size[1] as i64 - 1) as usize))
                 };
-                row += (at(0, 0) * (1.0 - fx) + at(1, 0) * fx) * (1.0 - fy) + (at(0, 1) * (1.0 - fx) + at(1, 1) * fx) * fy;
+                row +=
+                    (at(0, 0) * (1.0 - fx) + at(1, 0) * fx) * (1.0 - fy) + (at(0, 1) * (1.0 - fx) + at(1, 1) * fx) * fy;
             }
             sum += row * theta.sin() * theta.cos();
         }
         sum * (PI / f64::from(n)) * (2.0 * PI / f64::from(n))
     };
     let expected = irradiance(maps[0].1, &top) + irradiance(maps[1].1, &seam);
-    let lights = json!([{ "type": "environment", "file": maps[0].0 }, { "type": "environment", "file": maps[1].0, "transform": [{ "rotate": { "axis": [0, 1, 0], "degrees": 77 } }] }]);
+    let lights = json!([
+        { "type": "environment", "file": maps[0].0 },
+        { "type": "environment", "file": maps[1].0, "transform": [{ "rotate": { "axis": [0, 1, 0], "degrees": 77 } }] }
+    ]);
     for strategy in ["mis", "light", "bsdf"] {
         let mut scene = with_lights(floor_probe([0.0; 3], json!([])), lights.clone());
         scene["integrator"]["strategy"] = json!(strategy);
@@ -220,12 +261,30 @@ fn light_met_after_a_bounce_carries_the_paths_throughput() {
         [0.0, 0.0, 3.0],
         [0.0; 3],
         json!({ "sampler": { "spp": 16 }, "integrator": { "type": "path", "max_depth": 8, "rr_depth": 1 },
-            "materials": { "blue": { "type": "mirror", "reflectance": [0.2, 0.4, 0.8] }, "red": { "type": "mirror", "reflectance": [0.5, 0.25, 0.125] }, "black": { "type": "diffuse", "albedo": 0 } },
+            "materials": {
+                "blue": { "type": "mirror", "reflectance": [0.2, 0.4, 0.8] },
+                "red": { "type": "mirror", "reflectance": [0.5, 0.25, 0.125] },
+                "black": { "type": "diffuse", "albedo": 0 }
+            },
             "shapes": [
-                { "type": "quad", "material": "blue", "transform": [{ "rotate": { "axis": [0, 1, 0], "degrees": 45 } }] },
-                { "type": "quad", "material": "red", "transform": [{ "scale": 5 }, { "rotate": { "axis": [0, 1, 0], "degrees": -90 } }, { "translate": [4, 0, 0] }] },
-                { "type": "quad", "material": "black", "emission": { "radiance": [8, 8, 8] }, "origin": [-9, -9, 9], "edge_u": [18, 0, 0], "edge_v": [0, 18, 0], "reverse_normal": true },
-                { "type": "quad", "material": "black", "emission": { "radiance": [8, 8, 8] }, "origin": [-9, -9, -9], "edge_u": [18, 0, 0], "edge_v": [0, 18, 0] }
+                {
+                    "type": "quad", "material": "blue",
+                    "transform": [{ "rotate": { "axis": [0, 1, 0], "degrees": 45 } }]
+                },
+                {
+                    "type": "quad", "material": "red",
+                    "transform": [
+                        { "scale": 5 }, { "rotate": { "axis": [0, 1, 0], "degrees": -90 } }, { "translate": [4, 0, 0] }
+                    ]
+                },
+                {
+                    "type": "quad", "material": "black", "emission": { "radiance": [8, 8, 8] }, "origin": [-9, -9, 9],
+                    "edge_u": [18, 0, 0], "edge_v": [0, 18, 0], "reverse_normal": true
+                },
+                {
+                    "type": "quad", "material": "black", "emission": { "radiance": [8, 8, 8] }, "origin": [-9, -9, -9],
+                    "edge_u": [18, 0, 0], "edge_v": [0, 18, 0]
+                }
             ] }),
     );
     // Camera, blue (45 degrees), red (straight on), blue again, and back past the camera to the lamp behind it.
@@ -253,7 +312,9 @@ fn roulette_gives_the_survivors_the_weight_of_the_dead_on_every_material_and_fro
                 "sampler": { "type": "independent", "spp": 128, "seed": rr_depth },
                 "integrator": { "type": "path", "max_depth": 12, "rr_depth": rr_depth },
                 "materials": { "m": material },
-                "shapes": [{ "type": "sphere", "material": "m", "emission": { "radiance": [0.5, 0.5, 0.5], "two_sided": true } }]
+                "shapes": [{
+                    "type": "sphere", "material": "m", "emission": { "radiance": [0.5, 0.5, 0.5], "two_sided": true }
+                }]
             });
             Estimate::of(&render(&scene), 1)
         };
@@ -261,7 +322,10 @@ fn roulette_gives_the_survivors_the_weight_of_the_dead_on_every_material_and_fro
         for rr_depth in [1, 3, 5] {
             let with = mean(rr_depth);
             let error = with.error.hypot(without.error);
-            assert!((with.mean - without.mean).abs() < 5.5 * error, "{material}, from {rr_depth}: {with:?} {without:?}");
+            assert!(
+                (with.mean - without.mean).abs() < 5.5 * error,
+                "{material}, from {rr_depth}: {with:?} {without:?}"
+            );
         }
     }
 }

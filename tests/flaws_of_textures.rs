@@ -20,7 +20,10 @@ use steradian::math::random::Rng;
 fn scene_of(shapes: Value, material: Value) -> Value {
     json!({
         "film": { "width": 16, "height": 16, "filter": { "type": "box" } },
-        "camera": { "position": [0, 0, 9], "look_at": [0, 0, 0], "vertical_fov_degrees": 2.0 * (1.0f64 / 9.0).atan().to_degrees() },
+        "camera": {
+            "position": [0, 0, 9], "look_at": [0, 0, 0],
+            "vertical_fov_degrees": 2.0 * (1.0f64 / 9.0).atan().to_degrees()
+        },
         "sampler": { "spp": 1 },
         "textures": { "image": { "type": "image", "file": "image.png", "filter": "nearest" } },
         "materials": { "m": material },
@@ -79,7 +82,9 @@ fn triangles_spheres_and_instances_keep_the_type_of_their_material() {
         (json!({ "type": "principled" }), |bsdf| matches!(bsdf, Bsdf::Principled(_))),
     ];
     let folder = Folder::new();
-    let triangle = json!({ "type": "mesh", "material": "m", "positions": [[-1, -1, 0], [1, -1, 0], [0, 1, 0]], "triangles": [[0, 1, 2]] });
+    let triangle = json!({
+        "type": "mesh", "material": "m", "positions": [[-1, -1, 0], [1, -1, 0], [0, 1, 0]], "triangles": [[0, 1, 2]]
+    });
     for (material, is) in materials {
         for shape in [triangle.clone(), json!({ "type": "sphere", "material": "m" }), square()] {
             for instanced in [false, true] {
@@ -109,7 +114,10 @@ fn bounds_do_not_mix_up_their_axes() {
     let bounds = folder.compile(&json!({ "camera": { "position": [0, 0, 9], "look_at": [0, 0, 0] }, "shapes": [mesh],
         "lights": [{ "type": "environment", "radiance": [1, 1, 1] }] }));
     let bounds = bounds.unwrap().geometry.bounds();
-    assert!((bounds.min - min).abs().max_element() < 1e-3 && (bounds.max - max).abs().max_element() < 1e-2, "{bounds:?}");
+    assert!(
+        (bounds.min - min).abs().max_element() < 1e-3 && (bounds.max - max).abs().max_element() < 1e-2,
+        "{bounds:?}"
+    );
 }
 
 /// Derivatives that exist on one kind of shape only, or are solved with the wrong component.
@@ -123,9 +131,15 @@ fn derivatives_by_uv_are_those_of_every_shape() {
         json!({ "type": "sphere" }),
         json!({ "type": "disk", "inner_radius": 0.05 }),
         json!({ "type": "cone", "height": 0.7 }),
-        json!({ "type": "cylinder", "radius": 0.8, "height": 2, "transform": [{ "translate": [0, 0, -1] }, { "rotate": { "axis": [0, 1, 0], "degrees": 70 } }] }),
+        json!({
+            "type": "cylinder", "radius": 0.8, "height": 2,
+            "transform": [{ "translate": [0, 0, -1] }, { "rotate": { "axis": [0, 1, 0], "degrees": 70 } }]
+        }),
         json!({ "type": "revolution", "profile": { "bezier": [[0.5, -1], [1.5, -1], [1.5, 1], [0.5, 1]] } }),
-        json!({ "type": "mesh", "positions": [[-1, -1, 0], [1, -1, 0.2], [0, 1, 0.4]], "triangles": [[0, 1, 2]], "uvs": [[0.1, 0.7], [0.9, 0.2], [0.4, 0.1]] }),
+        json!({
+            "type": "mesh", "positions": [[-1, -1, 0], [1, -1, 0.2], [0, 1, 0.4]], "triangles": [[0, 1, 2]],
+            "uvs": [[0.1, 0.7], [0.9, 0.2], [0.4, 0.1]]
+        }),
     ] {
         let mut shape = shape.clone();
         let own = shape["transform"].as_array().cloned().unwrap_or_default();
@@ -141,7 +155,9 @@ fn derivatives_by_uv_are_those_of_every_shape() {
             let look = |x: f32, y: f32| meet(&scene, &Ray::new(vec3(x, y, 5.0), -Vec3::Z));
             let Some((at, dp_dv)) = look(x, y) else { continue };
             for (dx, dy) in [(step, 0.0), (0.0, step)] {
-                let (Some((after, _)), Some((before, _))) = (look(x + dx, y + dy), look(x - dx, y - dy)) else { continue };
+                let (Some((after, _)), Some((before, _))) = (look(x + dx, y + dy), look(x - dx, y - dy)) else {
+                    continue;
+                };
                 let duv = after.uv - before.uv;
                 let dp = (after.p - before.p).as_vec3();
                 // Away from seams, rims and edges, where a step is far longer than its projection.
@@ -183,7 +199,8 @@ fn an_obj_may_have_any_number_of_shapes() {
         let shape = |i: usize| format!("o shape{i}\nv {i} 0 0\nv {i} 1 0\nv {i} 0 1\nf -3 -2 -1\n");
         folder.write("shapes.obj", (0..count).map(shape).collect::<String>());
         let scene = folder.compile(&json!({
-            "camera": { "position": [0, 0, 9], "look_at": [0, 0, 0] }, "shapes": [{ "type": "mesh", "file": "shapes.obj" }],
+            "camera": { "position": [0, 0, 9], "look_at": [0, 0, 0] },
+            "shapes": [{ "type": "mesh", "file": "shapes.obj" }],
             "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
         }));
         let scene = scene.unwrap();

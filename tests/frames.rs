@@ -80,7 +80,11 @@ fn frames_that_are_there_are_skipped_unless_they_are_to_be_overwritten() {
     let size = |name: &str| std::fs::metadata(folder.path().join(name)).unwrap().len();
     assert!(size("a.0001.exr") > 5 && size("a.0002.exr") == 5 && size("a.0003.exr") > 5);
     let again = run(folder.path(), "render a.json --frames 1-3 -o a.exr -o a.png");
-    assert!(stderr_of(&again).contains("3 frames exist") && stderr_of(&again).ends_with("Progress: 100%\n"), "{}", stderr_of(&again));
+    assert!(
+        stderr_of(&again).contains("3 frames exist") && stderr_of(&again).ends_with("Progress: 100%\n"),
+        "{}",
+        stderr_of(&again)
+    );
     assert!(run(folder.path(), "render a.json --frames 2 -o a.exr -o a.png --overwrite").status.success());
     assert!(size("a.0002.exr") > 5);
 }
@@ -136,8 +140,10 @@ fn progress_is_that_of_the_sequence_and_complete_only_at_its_end() {
     let folder = folder_with(&[("a.json", scene())]);
     let output = run(folder.path(), "render a.json --frames 1-4 -o a.exr --progress alf -q");
     let lines: Vec<String> = stderr_of(&output).lines().map(str::to_owned).collect();
-    let percents: Vec<u32> =
-        lines.iter().map(|l| l.strip_prefix("ALF_PROGRESS ").unwrap().strip_suffix('%').unwrap().parse().unwrap()).collect();
+    let percents: Vec<u32> = lines
+        .iter()
+        .map(|l| l.strip_prefix("ALF_PROGRESS ").unwrap().strip_suffix('%').unwrap().parse().unwrap())
+        .collect();
     assert!(percents.is_sorted() && percents.last() == Some(&100), "{lines:?}");
     assert_eq!(percents.iter().filter(|percent| **percent == 100).count(), 1);
 
@@ -151,7 +157,8 @@ fn progress_is_that_of_the_sequence_and_complete_only_at_its_end() {
 #[test]
 fn an_interrupt_ends_the_sequence() {
     let folder = folder_with(&[("a.json", scene())]);
-    let mut command = steradian(folder.path(), "render a.json --frames 1-100000 -o a.exr --spp 4000 --progress afanasy");
+    let mut command =
+        steradian(folder.path(), "render a.json --frames 1-100000 -o a.exr --spp 4000 --progress afanasy");
     let mut child = Running::start(command.stderr(Stdio::piped()));
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
     assert!(lines.any(|line| line == "FRAME: 2"));
@@ -160,7 +167,8 @@ fn an_interrupt_ends_the_sequence() {
     assert_eq!(child.wait().unwrap().code(), Some(130), "{rest:?}");
     assert!(!rest.iter().any(|line| line.contains("SUCCESS")));
     // Whatever is there counts as complete: of the frame under way there is nothing.
-    let is_frame = |entry: std::io::Result<std::fs::DirEntry>| entry.unwrap().path().extension().is_some_and(|e| e == "exr");
+    let is_frame =
+        |entry: std::io::Result<std::fs::DirEntry>| entry.unwrap().path().extension().is_some_and(|e| e == "exr");
     let written = std::fs::read_dir(folder.path()).unwrap().filter_map(|entry| is_frame(entry).then_some(())).count();
     let complete = 1 + rest.iter().filter(|line| line.starts_with("wrote a.")).count();
     assert!(written == complete && !rest.iter().any(|line| line.contains("(interrupted)")), "{written} {rest:?}");
@@ -169,7 +177,9 @@ fn an_interrupt_ends_the_sequence() {
 #[test]
 fn wrong_frames_are_refused() {
     let folder = folder_with(&[("a.json", scene())]);
-    for arguments in ["--frames 1-", "--frames x", "--overwrite", "--frames 1 --fps 0", "--frames 1-2 --preview 0 --preview-hold"] {
+    for arguments in
+        ["--frames 1-", "--frames x", "--overwrite", "--frames 1 --fps 0", "--frames 1-2 --preview 0 --preview-hold"]
+    {
         assert_eq!(run(folder.path(), &format!("render a.json {arguments}")).status.code(), Some(2), "{arguments}");
     }
 }

@@ -23,7 +23,8 @@ fn every_named_file_is_read_or_refused() {
     let regressions = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/regressions");
     let folder = tempfile::tempdir().unwrap();
     for kind in KINDS {
-        let files: Vec<_> = std::fs::read_dir(regressions.join(kind)).unwrap().map(|entry| entry.unwrap().path()).collect();
+        let files: Vec<_> =
+            std::fs::read_dir(regressions.join(kind)).unwrap().map(|entry| entry.unwrap().path()).collect();
         assert!(!files.is_empty(), "{kind}");
         for file in files {
             check(kind, &std::fs::read(&file).unwrap(), folder.path(), &file);
@@ -44,7 +45,8 @@ fn every_file_of_the_corpus_is_read_or_refused() {
         }
         let file = entry.path().unwrap().into_owned();
         let kind = file.iter().nth(1).unwrap().to_str().unwrap().to_owned();
-        let which = KINDS.iter().position(|known| *known == kind).unwrap_or_else(|| panic!("{}: no such kind", file.display()));
+        let which =
+            KINDS.iter().position(|known| *known == kind).unwrap_or_else(|| panic!("{}: no such kind", file.display()));
         let mut bytes = Vec::new();
         entry.read_to_end(&mut bytes).unwrap();
         check(&kind, &bytes, folder.path(), &file);

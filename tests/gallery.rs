@@ -72,7 +72,10 @@ fn the_readme_shows_every_scene_and_every_picture() {
     let pictures = names(&folder().join("pictures"), "png");
     for picture in &pictures {
         assert!(readme.contains(&format!("(pictures/{picture}.png)")), "scenes/README.md does not show {picture}.png");
-        assert!(script.lines().any(|line| line.split(' ').next() == Some(picture)), "render_gallery.sh does not render {picture}.png");
+        assert!(
+            script.lines().any(|line| line.split(' ').next() == Some(picture)),
+            "render_gallery.sh does not render {picture}.png"
+        );
         let bytes = fs::metadata(folder().join("pictures").join(picture).with_extension("png")).unwrap().len();
         assert!(bytes < MAX_PICTURE_BYTES, "{picture}.png has {bytes} bytes");
     }

@@ -19,7 +19,8 @@ const GONE: [u8; 4] = [255, 255, 255, 0];
 /// A square of two units about the origin, facing +Z, its image (`map.png`) upright, seen by a camera that shows just
 /// it; a dim light is there.
 fn square(material: Value) -> Value {
-    let floats: [f32; 20] = [-1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 1.0, 1.0, 0.0, -1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0];
+    let floats: [f32; 20] =
+        [-1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 1.0, 1.0, 0.0, -1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0];
     let bytes = floats.iter().flat_map(|x| x.to_le_bytes()).chain([0, 1, 2, 0, 2, 3]);
     let data: String = bytes.map(|b| format!("%{b:02x}")).collect();
     json!({
@@ -30,7 +31,9 @@ fn square(material: Value) -> Value {
             { "camera": 0, "translation": [0, 0, 5] },
             { "translation": [0, 0, 900], "extensions": { "KHR_lights_punctual": { "light": 0 } } }
         ],
-        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0, "TEXCOORD_0": 1 }, "indices": 2, "material": 0 }] }],
+        "meshes": [{
+            "primitives": [{ "attributes": { "POSITION": 0, "TEXCOORD_0": 1 }, "indices": 2, "material": 0 }]
+        }],
         "cameras": [{ "type": "orthographic", "orthographic": { "xmag": 1, "ymag": 1, "znear": 0.1, "zfar": 10 } }],
         "materials": [material],
         "textures": [{ "source": 0, "sampler": 0 }],
@@ -125,7 +128,10 @@ fn the_back_gives_light_only_where_it_is_a_side() {
         }
         quarters(&render(&gltf, [RED; 4])).iter().any(|pixel| pixel[0] > 0.9)
     };
-    assert_eq!([(false, false), (true, false), (false, true), (true, true)].map(|(d, t)| seen(d, t)), [true, true, false, true]);
+    assert_eq!(
+        [(false, false), (true, false), (false, true), (true, true)].map(|(d, t)| seen(d, t)),
+        [true, true, false, true]
+    );
 }
 
 /// A normal tilted towards a light makes a surface brighter: red to the right in the image, green up in it.

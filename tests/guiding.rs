@@ -35,12 +35,19 @@ fn room() -> Value {
         "camera": { "position": [-0.6, 1.0, 1.8], "look_at": [-1.2, 0.8, -1.0], "vertical_fov_degrees": 60 },
         "film": { "width": 72, "height": 72, "filter": { "type": "box" } },
         "integrator": { "type": "path", "max_depth": 12 },
-        "materials": { "white": { "type": "diffuse", "albedo": 0.7 }, "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 } },
+        "materials": {
+            "white": { "type": "diffuse", "albedo": 0.7 },
+            "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 }
+        },
         "shapes": walls_and(vec![
             quad("white", [0.4, 0.0, -2.0], [0.0, 0.0, 3.7], [0.0, 2.0, 0.0]),
-            json!({ "type": "sphere", "material": "gold", "radius": 0.3, "transform": [{ "translate": [-1.1, 0.3, -0.4] }] }),
-            json!({ "type": "quad", "material": "white", "origin": [1.6, 1.8, -1.6], "edge_u": [0.3, 0, 0], "edge_v": [0, 0, 0.3],
-              "emission": { "radiance": [90, 80, 60] } }),
+            json!({
+                "type": "sphere", "material": "gold", "radius": 0.3, "transform": [{ "translate": [-1.1, 0.3, -0.4] }]
+            }),
+            json!({
+                "type": "quad", "material": "white", "origin": [1.6, 1.8, -1.6], "edge_u": [0.3, 0, 0],
+                "edge_v": [0, 0, 0.3], "emission": { "radiance": [90, 80, 60] }
+            }),
         ])
     })
 }
@@ -60,8 +67,10 @@ fn room_with_shaft() -> Value {
             wall(-half, half, [2.0 * half, 0.0, 0.0]),
             wall(-half, -half, [0.0, 0.0, 2.0 * half]),
             wall(half, -half, [0.0, 0.0, 2.0 * half]),
-            json!({ "type": "quad", "material": "black", "origin": [-half, bottom, -half], "edge_u": [0, 0, 2.0 * half], "edge_v": [2.0 * half, 0, 0],
-              "emission": { "radiance": [400, 400, 400] } }),
+            json!({
+                "type": "quad", "material": "black", "origin": [-half, bottom, -half], "edge_u": [0, 0, 2.0 * half],
+                "edge_v": [2.0 * half, 0, 0], "emission": { "radiance": [400, 400, 400] }
+            }),
         ])
     })
 }
@@ -106,7 +115,8 @@ fn guiding_lowers_the_error_where_light_is_hard_to_find() {
 fn guided_pictures_do_not_depend_on_threads() {
     let images: Vec<Image> = [1, 2, 3]
         .map(|threads| {
-            let overrides = Overrides { threads: Some(threads), guiding: Some(true), spp: Some(24), ..Overrides::default() };
+            let overrides =
+                Overrides { threads: Some(threads), guiding: Some(true), spp: Some(24), ..Overrides::default() };
             render_with(&prepare(&room(), &overrides), AccelKind::EMBREE).image
         })
         .into();
@@ -125,7 +135,8 @@ fn crops_limits_and_layers_hold() {
     }
     let mut layered = room();
     layered["outputs"] = json!([{ "file": "unused.exr", "layers": ["Z", "N", "albedo", "samples", "variance"] }]);
-    let [guided, plain] = [true, false].map(|guiding| run(&layered, guiding, &Overrides { spp: Some(16), ..Overrides::default() }).image);
+    let [guided, plain] =
+        [true, false].map(|guiding| run(&layered, guiding, &Overrides { spp: Some(16), ..Overrides::default() }).image);
     for kind in [LayerKind::Z, LayerKind::N, LayerKind::Samples] {
         assert_eq!(guided.layer(kind), plain.layer(kind), "{kind:?}");
     }
@@ -150,7 +161,8 @@ fn scenes_without_lamps_stay_what_they_are() {
     let mut open = room();
     open["shapes"] = json!([open["shapes"][0].clone()]);
     open["lights"] = json!([{ "type": "environment", "radiance": [1, 1, 1] }]);
-    let [guided, plain] = [true, false].map(|guiding| run(&open, guiding, &Overrides { spp: Some(32), ..Overrides::default() }));
+    let [guided, plain] =
+        [true, false].map(|guiding| run(&open, guiding, &Overrides { spp: Some(32), ..Overrides::default() }));
     let means = [&guided.image, &plain.image].map(|image| block_means(image).iter().sum::<f64>());
     assert!((means[0] / means[1] - 1.0).abs() < 0.01, "{means:?}");
 }
@@ -232,7 +244,9 @@ fn an_interrupted_guided_render_has_a_picture() {
     assert!(merged.state.film.resolve() == state.whole_film().resolve());
 
     let more = self::kit(&room(), 65);
-    let refused = RenderState::read(file.path(), &more.header(Shard::WHOLE), &more.prepared.scene, &more.prepared.settings).unwrap_err();
+    let refused =
+        RenderState::read(file.path(), &more.header(Shard::WHOLE), &more.prepared.scene, &more.prepared.settings)
+            .unwrap_err();
     assert!(refused.to_string().contains("spp: 64 in the checkpoint, 65 requested"), "{refused}");
 }
 

@@ -15,7 +15,8 @@ fn every_format_has_whole_lines_and_ends_with_all() {
         ("deadline", "Progress: 100%", ""),
         ("afanasy", "PROGRESS: 100%", "[ PARSER FINISHED SUCCESS ]\n"),
     ] {
-        let output = run(folder.path(), &format!("render scene.json -o a.exr --spp 64 --target-error 0.01 --progress {format}"));
+        let output =
+            run(folder.path(), &format!("render scene.json -o a.exr --spp 64 --target-error 0.01 --progress {format}"));
         let text = stderr_of(&output);
         assert_eq!(output.status.code(), Some(0), "{text}");
         assert!(text.ends_with(&format!("\n{all}\n{last}")) && !text.contains(['\r', '\x1b']), "{format}: {text:?}");
@@ -33,12 +34,18 @@ fn every_format_has_whole_lines_and_ends_with_all() {
 #[test]
 fn failures_are_reported_in_the_farms_words() {
     let folder = tempfile::tempdir().unwrap();
-    for (format, line) in
-        [("deadline", "Error: missing.json: "), ("openjd", "openjd_fail: missing.json: "), ("afanasy", "[ PARSER ERROR ] missing.json: ")]
-    {
+    for (format, line) in [
+        ("deadline", "Error: missing.json: "),
+        ("openjd", "openjd_fail: missing.json: "),
+        ("afanasy", "[ PARSER ERROR ] missing.json: "),
+    ] {
         let output = run(folder.path(), &format!("render missing.json --progress {format}"));
         assert_eq!(output.status.code(), Some(4));
-        assert!(stderr_of(&output).lines().any(|l| l.starts_with(line)) && !stderr_of(&output).contains("100%"), "{}", stderr_of(&output));
+        assert!(
+            stderr_of(&output).lines().any(|l| l.starts_with(line)) && !stderr_of(&output).contains("100%"),
+            "{}",
+            stderr_of(&output)
+        );
     }
 }
 
@@ -47,13 +54,19 @@ fn messages_are_json_and_go_to_files_by_option() {
     let folder = tempfile::tempdir().unwrap();
     let output = run(folder.path(), "render scene.json -o a.exr --progress json --log-file log.txt");
     let values: Vec<Value> = stderr_of(&output).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-    assert!(values.iter().any(|v| v["message"] == "wrote a.exr" && v["level"] == "note" && v["time"].is_string()), "{values:?}");
+    assert!(
+        values.iter().any(|v| v["message"] == "wrote a.exr" && v["level"] == "note" && v["time"].is_string()),
+        "{values:?}"
+    );
     let progress: Vec<&Value> = values.iter().filter(|v| v["event"] == "progress").collect();
     assert_eq!(progress.last().unwrap()["percent"], 100.0);
     assert_eq!(values.last().unwrap()["event"], "success");
 
     // Another run adds to the file, whatever it prints to stderr; each line has its time, level and text.
-    assert_eq!(stderr_of(&run(folder.path(), "render scene.json -o b.exr -q --log-format text --log-file log.txt")), "");
+    assert_eq!(
+        stderr_of(&run(folder.path(), "render scene.json -o b.exr -q --log-format text --log-file log.txt")),
+        ""
+    );
     let log = std::fs::read_to_string(folder.path().join("log.txt")).unwrap();
     let lines: Vec<&str> = log.lines().collect();
     assert!(lines.iter().any(|line| line.contains("wrote a.exr")));
@@ -129,20 +142,31 @@ fn unknown_keys_are_errors_with_file_and_line() {
         let output = run(folder.path(), command);
         assert_eq!(output.status.code(), Some(2));
         let text = stderr_of(&output);
-        assert!(text.contains("steradian.toml:3: \"thread\" is no option of render (did you mean \"threads\"?)"), "{text}");
+        assert!(
+            text.contains("steradian.toml:3: \"thread\" is no option of render (did you mean \"threads\"?)"),
+            "{text}"
+        );
     }
 }
 
 #[test]
 fn farms_say_how_many_processors_a_task_has() {
     let folder = tempfile::tempdir().unwrap();
-    for (variable, arguments, threads) in
-        [("SLURM_CPUS_PER_TASK", "", 3), ("CUE_THREADS", "", 3), ("SLURM_CPUS_PER_TASK", "--threads 2", 2), ("STERADIAN_THREADS", "", 3)]
-    {
+    for (variable, arguments, threads) in [
+        ("SLURM_CPUS_PER_TASK", "", 3),
+        ("CUE_THREADS", "", 3),
+        ("SLURM_CPUS_PER_TASK", "--threads 2", 2),
+        ("STERADIAN_THREADS", "", 3),
+    ] {
         let mut command = steradian(folder.path(), &format!("render scene.json -o a.exr --json - -v {arguments}"));
         let output = command.env(variable, "3").output().unwrap();
         assert_eq!(serde_json::from_slice::<Value>(&output.stdout).unwrap()["threads"], threads, "{variable}");
-        assert_eq!(stderr_of(&output).contains(&format!("threads = 3 (environment: {variable})")), threads == 3, "{}", stderr_of(&output));
+        assert_eq!(
+            stderr_of(&output).contains(&format!("threads = 3 (environment: {variable})")),
+            threads == 3,
+            "{}",
+            stderr_of(&output)
+        );
     }
 }
 
@@ -156,6 +180,9 @@ fn every_command_has_its_manual_page() {
         assert!(folder.path().join("man").join(name).exists(), "{name}");
     }
     for shell in ["bash", "zsh", "fish"] {
-        assert!(String::from_utf8_lossy(&run(folder.path(), &format!("completions {shell}")).stdout).contains("progress"), "{shell}");
+        assert!(
+            String::from_utf8_lossy(&run(folder.path(), &format!("completions {shell}")).stdout).contains("progress"),
+            "{shell}"
+        );
     }
 }

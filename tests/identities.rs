@@ -26,12 +26,19 @@ fn scene() -> Value {
             { "type": "sphere", "material": "red", "name": "ball" },
             { "type": "sphere" },
             { "type": "mesh", "file": "models/two.obj" },
-            { "type": "quad", "name": "slider", "motion": [{ "time": 0 }, { "time": 1, "transform": [{ "translate": [1, 0, 0] }] }] },
+            {
+                "type": "quad", "name": "slider",
+                "motion": [{ "time": 0 }, { "time": 1, "transform": [{ "translate": [1, 0, 0] }] }]
+            },
             { "type": "disk", "name": "quad_5" },
             { "type": "quad" }
         ],
         "objects": {
-            "lamp": { "shapes": [{ "type": "sphere", "name": "bulb", "emission": { "radiance": [1, 1, 1] } }, { "type": "cylinder" }] },
+            "lamp": {
+                "shapes": [
+                    { "type": "sphere", "name": "bulb", "emission": { "radiance": [1, 1, 1] } }, { "type": "cylinder" }
+                ]
+            },
             "room": { "shapes": [{ "type": "cube", "material": "red" }],
                       "instances": [{ "object": "lamp", "name": "left" }, { "object": "lamp" }] }
         },
@@ -84,8 +91,10 @@ fn everything_has_a_name() {
 
 #[test]
 fn names_of_many_shapes_take_little_memory() {
-    let spheres: Vec<Value> = (0..20_000).map(|i| json!({ "type": "sphere", "transform": [{ "translate": [i, 0, 0] }] })).collect();
-    let instances: Vec<Value> = (0..10_000).map(|i| json!({ "object": "o", "transform": [{ "translate": [i, 3, 0] }] })).collect();
+    let spheres: Vec<Value> =
+        (0..20_000).map(|i| json!({ "type": "sphere", "transform": [{ "translate": [i, 0, 0] }] })).collect();
+    let instances: Vec<Value> =
+        (0..10_000).map(|i| json!({ "object": "o", "transform": [{ "translate": [i, 3, 0] }] })).collect();
     let mut scene = scene();
     scene["shapes"] = json!(spheres);
     scene["objects"] = json!({ "o": { "shapes": [{ "type": "sphere" }] } });

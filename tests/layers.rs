@@ -12,7 +12,9 @@ use steradian::render::{Overrides, Settings};
 use steradian::{compile, import};
 
 use crate::util::folder::set;
-use crate::util::render::{AssertIs, Estimate, Prepared, assert_blocks_agree, block_means, merge, prepare, render_with};
+use crate::util::render::{
+    AssertIs, Estimate, Prepared, assert_blocks_agree, block_means, merge, prepare, render_with,
+};
 
 /// The parts of the light by how it came.
 const PARTS: [LayerKind; 8] = [
@@ -62,7 +64,10 @@ fn assert_sum(image: &Image, layers: &[&Layer], what: &str) {
             let terms = layers.iter().map(|layer| f64::from(layer.data[3 * i + channel]));
             let (sum, size) = terms.fold((0.0, 0.0), |(sum, size), term| (sum + term, size + f64::abs(term)));
             let expected = f64::from(expected);
-            assert!((sum - expected).abs() <= 1e-5 * size.max(expected.abs()) + 1e-9, "{what}, pixel {i}: {sum} for {expected}");
+            assert!(
+                (sum - expected).abs() <= 1e-5 * size.max(expected.abs()) + 1e-9,
+                "{what}, pixel {i}: {sum} for {expected}"
+            );
             lit += usize::from(size > 0.0);
         }
     }
@@ -125,8 +130,14 @@ fn parts_and_groups_sum_to_the_picture_whatever_the_integrator_does() {
         }
         // Two suns and a sky in groups of their own.
         let lights = json!([
-            { "type": "directional", "direction": [0.2, -1, 0.3], "irradiance": [1, 2, 3], "angular_diameter_degrees": 20, "group": "sun" },
-            { "type": "directional", "direction": [-0.2, -1, 0.3], "irradiance": [3, 2, 1], "angular_diameter_degrees": 30 },
+            {
+                "type": "directional", "direction": [0.2, -1, 0.3], "irradiance": [1, 2, 3],
+                "angular_diameter_degrees": 20, "group": "sun"
+            },
+            {
+                "type": "directional", "direction": [-0.2, -1, 0.3], "irradiance": [3, 2, 1],
+                "angular_diameter_degrees": 30
+            },
             { "type": "environment", "radiance": [0.2, 0.1, 0.3], "group": "sky" }
         ]);
         scene["lights"] = lights;
@@ -158,7 +169,10 @@ const ALBEDO: [f64; 3] = [0.8, 0.5, 0.2];
 fn a_furnace_parts_light_by_bounces() {
     // Within a sphere of albedo a and radiance 1: 1 is seen, a is scattered once, a² + a³ more often on at most 4
     // segments.
-    let shapes = json!([{ "type": "sphere", "radius": 10, "material": "m", "reverse_normal": true, "emission": { "radiance": [1, 1, 1], "group": "walls" } }]);
+    let shapes = json!([{
+        "type": "sphere", "radius": 10, "material": "m", "reverse_normal": true,
+        "emission": { "radiance": [1, 1, 1], "group": "walls" }
+    }]);
     for strategy in ["mis", "bsdf"] {
         let scene = room(json!({ "integrator": { "strategy": strategy }, "shapes": shapes }));
         let image = full_of(&scene);
@@ -170,7 +184,10 @@ fn a_furnace_parts_light_by_bounces() {
                 part(&image, kind, channel).assert_is(0.0, strategy);
             }
         }
-        assert_eq!(groups(&image)[0].pixels().next(), image.layer(LayerKind::Color).unwrap().pixels().next().map(|p| &p[..3]));
+        assert_eq!(
+            groups(&image)[0].pixels().next(),
+            image.layer(LayerKind::Color).unwrap().pixels().next().map(|p| &p[..3])
+        );
         assert!(groups(&image)[1].data.iter().all(|value| *value == 0.0));
     }
 }
@@ -181,7 +198,10 @@ fn a_pane_parts_reflection_from_transmission() {
     let scene = room(json!({
         "camera": { "type": "orthographic", "view_height": 1 },
         "materials": { "pane": { "type": "thin_dielectric", "ior": 1.5 } },
-        "shapes": [{ "type": "quad", "material": "pane" }, { "type": "quad", "material": "m", "transform": [{ "translate": [0, 0, -1] }] }],
+        "shapes": [
+            { "type": "quad", "material": "pane" },
+            { "type": "quad", "material": "m", "transform": [{ "translate": [0, 0, -1] }] }
+        ],
         "lights": [{ "type": "environment", "radiance": [0.5, 0.5, 0.5] }]
     }));
     let mut scene = scene;
@@ -209,13 +229,18 @@ fn highlights_and_what_is_below_are_parted_by_their_lobes() {
     for material in [
         json!({ "type": "plastic", "albedo": [0.8, 0.5, 0.2], "roughness": 0.4 }),
         json!({ "type": "phong", "diffuse": [0.6, 0.5, 0.2], "specular": [0.3, 0.3, 0.3], "exponent": 20 }),
-        json!({ "type": "phong", "diffuse": [0.6, 0.5, 0.2], "specular": [0.3, 0.3, 0.3], "exponent": 20, "lobe": "cosine" }),
+        json!({
+            "type": "phong", "diffuse": [0.6, 0.5, 0.2], "specular": [0.3, 0.3, 0.3], "exponent": 20, "lobe": "cosine"
+        }),
         json!({ "type": "plastic", "albedo": [0.8, 0.5, 0.2] }),
     ] {
         let floor = |material: Value| {
             full_of(&room(json!({
                 "camera": { "position": [0, 2, 4], "vertical_fov_degrees": 1 }, "materials": { "floor": material },
-                "shapes": [{ "type": "quad", "material": "floor", "origin": [-9, 0, 9], "edge_u": [18, 0, 0], "edge_v": [0, 0, -18] }],
+                "shapes": [{
+                    "type": "quad", "material": "floor", "origin": [-9, 0, 9], "edge_u": [18, 0, 0],
+                    "edge_v": [0, 0, -18]
+                }],
                 "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
             })))
         };
@@ -273,7 +298,10 @@ fn groups_show_what_their_lights_alone_give() {
         let group = *groups(&both).iter().find(|layer| layer.group.as_deref() == Some(name)).unwrap();
         let pairs = group.pixels().zip(alone.layer(LayerKind::Color).unwrap().pixels());
         for (found, expected) in pairs {
-            assert!((0..3).all(|c| (found[c] - expected[c]).abs() <= 2e-6 * expected[c]), "{name}: {found:?} {expected:?}");
+            assert!(
+                (0..3).all(|c| (found[c] - expected[c]).abs() <= 2e-6 * expected[c]),
+                "{name}: {found:?} {expected:?}"
+            );
         }
     }
     // Paths choose among lights: by Welch's test on blocks of pixels.
@@ -311,10 +339,15 @@ fn denoisers_see_what_is_in_mirrors() {
         "lights": [{ "type": "environment", "radiance": [0.25, 3.0, 0.0] }]
     }));
     let image = full_of(&scene);
-    let at = |kind: LayerKind, y: u32| image.pixel(kind, 12, y).unwrap().iter().map(|v| f64::from(*v)).collect::<Vec<_>>();
+    let at =
+        |kind: LayerKind, y: u32| image.pixel(kind, 12, y).unwrap().iter().map(|v| f64::from(*v)).collect::<Vec<_>>();
     let close = |found: Vec<f64>, expected: [f64; 3]| found.iter().zip(expected).all(|(f, e)| (f - e).abs() < 1e-5);
     // Below, the wall; above, the sky, as far as it is not brighter than white.
-    assert!(close(at(LayerKind::FeatureAlbedo, 20), [0, 1, 2].map(|c| tint[c] * ALBEDO[c])), "{:?}", at(LayerKind::FeatureAlbedo, 20));
+    assert!(
+        close(at(LayerKind::FeatureAlbedo, 20), [0, 1, 2].map(|c| tint[c] * ALBEDO[c])),
+        "{:?}",
+        at(LayerKind::FeatureAlbedo, 20)
+    );
     assert!(close(at(LayerKind::FeatureNormal, 20), [-1.0, 0.0, 0.0]), "{:?}", at(LayerKind::FeatureNormal, 20));
     assert!(close(at(LayerKind::FeatureAlbedo, 2), [0.125, 0.8, 0.0]), "{:?}", at(LayerKind::FeatureAlbedo, 2));
     assert!(close(at(LayerKind::FeatureNormal, 2), [0.0; 3]));
@@ -335,8 +368,11 @@ fn motion_is_that_of_things_and_of_the_camera() {
     let is = |found: &[[f32; 2]], expected: [f32; 2]| {
         assert!(found.iter().all(|p| (0..2).all(|k| (p[k] - expected[k]).abs() < 1e-3)), "{found:?} for {expected:?}");
     };
-    let large =
-        |motion: Value| json!({ "type": "quad", "origin": [-9, -9, 0], "edge_u": [18, 0, 0], "edge_v": [0, 18, 0], "motion": motion });
+    let large = |motion: Value| {
+        json!({
+            "type": "quad", "origin": [-9, -9, 0], "edge_u": [18, 0, 0], "edge_v": [0, 18, 0], "motion": motion
+        })
+    };
     let slide = json!([{ "time": 0 }, { "time": 1, "transform": [{ "translate": [0.5, 0.25, 0] }] }]);
     is(&ahead(json!({}), large(json!([]))), [0.0, 0.0]);
     is(&ahead(json!({}), large(slide.clone())), [6.0, -3.0]);
@@ -346,7 +382,9 @@ fn motion_is_that_of_things_and_of_the_camera() {
 
     // What a camera that turns sees at infinity goes the other way.
     let mut scene = room(json!({
-        "camera": { "motion": [{ "time": 0 }, { "time": 1, "transform": [{ "rotate": { "axis": [0, 1, 0], "degrees": 1 } }] }] },
+        "camera": {
+            "motion": [{ "time": 0 }, { "time": 1, "transform": [{ "rotate": { "axis": [0, 1, 0], "degrees": 1 } }] }]
+        },
         "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
     }));
     scene["camera"]["position"] = json!([0, 0, 0]);

@@ -13,7 +13,9 @@ fn furnace(max_depth: u32, rr_depth: u32) -> Value {
         "sampler": { "type": "independent", "spp": 256 },
         "integrator": { "type": "path", "max_depth": max_depth, "rr_depth": rr_depth },
         "materials": { "grey": { "type": "diffuse", "albedo": 0.5 } },
-        "shapes": [{ "type": "sphere", "material": "grey", "emission": { "radiance": [0.5, 0.5, 0.5], "two_sided": true } }]
+        "shapes": [{
+            "type": "sphere", "material": "grey", "emission": { "radiance": [0.5, 0.5, 0.5], "two_sided": true }
+        }]
     })
 }
 
@@ -52,8 +54,14 @@ fn the_strategies_agree_on_three_scenes() {
             { "type": "quad", "material": "b", "origin": [-1, 0, 1], "edge_u": [1, 0, 0], "edge_v": [0, 0.4, -2] },
             { "type": "quad", "material": "c", "origin": [0, 0, 1], "edge_u": [1, 0, 0], "edge_v": [0, 0.4, -2] },
             { "type": "quad", "material": "d", "origin": [1, 0, 1], "edge_u": [1, 0, 0], "edge_v": [0, 0.4, -2] },
-            { "type": "sphere", "radius": 0.4, "material": "black", "emission": { "radiance": [5, 4, 3] }, "transform": [{ "translate": [-1, 2, -2] }] },
-            { "type": "sphere", "radius": 0.9, "material": "black", "emission": { "radiance": [1, 2, 3] }, "transform": [{ "translate": [1.2, 2.2, -2] }] }
+            {
+                "type": "sphere", "radius": 0.4, "material": "black", "emission": { "radiance": [5, 4, 3] },
+                "transform": [{ "translate": [-1, 2, -2] }]
+            },
+            {
+                "type": "sphere", "radius": 0.9, "material": "black", "emission": { "radiance": [1, 2, 3] },
+                "transform": [{ "translate": [1.2, 2.2, -2] }]
+            }
         ]
     });
     let open_air = json!({
@@ -63,7 +71,10 @@ fn the_strategies_agree_on_three_scenes() {
         "shapes": [
             { "type": "quad", "material": "grey", "origin": [-4, 0, 4], "edge_u": [8, 0, 0], "edge_v": [0, 0, -8] },
             { "type": "sphere", "material": "rough", "radius": 0.5, "transform": [{ "translate": [-0.6, 0.5, 0] }] },
-            { "type": "cylinder", "material": "grey", "radius": 0.3, "height": 1, "transform": [{ "translate": [0.7, 0.4, 0] }] }
+            {
+                "type": "cylinder", "material": "grey", "radius": 0.3, "height": 1,
+                "transform": [{ "translate": [0.7, 0.4, 0] }]
+            }
         ],
         "lights": [
             { "type": "environment", "radiance": [0.4, 0.5, 0.6] },
@@ -78,16 +89,28 @@ fn the_strategies_agree_on_three_scenes() {
             { "type": "quad", "material": "grey", "origin": [-4, 0, 4], "edge_u": [8, 0, 0], "edge_v": [0, 0, -8] },
             { "type": "disk", "radius": 0.6, "inner_radius": 0.2, "phi_max_degrees": 200, "material": "black",
               "emission": { "radiance": [3, 2, 1], "two_sided": true }, "transform": [{ "translate": [-1, 1, -0.5] }] },
-            { "type": "cone", "radius": 0.4, "height": 0.8, "phi_max_degrees": 280, "material": "black",
-              "emission": { "radiance": [1, 3, 2], "two_sided": true }, "transform": [{ "translate": [0.2, 0.8, -0.5] }] },
-            { "type": "sphere", "radius": 0.4, "z_max": 0.1, "phi_max_degrees": 270, "material": "black",
-              "emission": { "radiance": [2, 1, 3], "two_sided": true }, "transform": [{ "translate": [1.2, 0.8, 0.3] }] },
-            { "type": "revolution", "profile": { "bezier": [[0.1, 0], [0.4, 0.2], [0, 0.5], [0.2, 0.8]] }, "material": "black",
-              "emission": { "radiance": [2, 2, 2] }, "transform": [{ "translate": [-0.3, 0.3, 1] }] }
+            {
+                "type": "cone", "radius": 0.4, "height": 0.8, "phi_max_degrees": 280, "material": "black",
+                "emission": { "radiance": [1, 3, 2], "two_sided": true },
+                "transform": [{ "translate": [0.2, 0.8, -0.5] }]
+            },
+            {
+                "type": "sphere", "radius": 0.4, "z_max": 0.1, "phi_max_degrees": 270, "material": "black",
+                "emission": { "radiance": [2, 1, 3], "two_sided": true },
+                "transform": [{ "translate": [1.2, 0.8, 0.3] }]
+            },
+            {
+                "type": "revolution", "profile": { "bezier": [[0.1, 0], [0.4, 0.2], [0, 0.5], [0.2, 0.8]] },
+                "material": "black", "emission": { "radiance": [2, 2, 2] },
+                "transform": [{ "translate": [-0.3, 0.3, 1] }]
+            }
         ]
     });
     for (name, rest) in [("plates", plates), ("open air", open_air), ("partial lights", partial_lights)] {
-        let mut scene = json!({ "film": { "width": 24, "height": 24, "filter": { "type": "box" } }, "sampler": { "type": "independent", "spp": 1024 } });
+        let mut scene = json!({
+            "film": { "width": 24, "height": 24, "filter": { "type": "box" } },
+            "sampler": { "type": "independent", "spp": 1024 }
+        });
         merge(&mut scene, rest);
         // Pixels differ from each other, so the standard error comes from independent renders, block by block.
         let blocks = |strategy: &str| -> Vec<Vec<f64>> {
@@ -111,7 +134,10 @@ fn the_strategies_agree_on_three_scenes() {
 fn next_event_estimation_does_not_count_light_twice() {
     // A diffuse floor under an emissive sphere: twice the light if emission were added at every hit besides light
     // sampling.
-    let sphere = json!({ "type": "sphere", "radius": 0.5, "material": "black", "emission": { "radiance": [1, 1, 1] }, "transform": [{ "translate": [0, 2, 0] }] });
+    let sphere = json!({
+        "type": "sphere", "radius": 0.5, "material": "black", "emission": { "radiance": [1, 1, 1] },
+        "transform": [{ "translate": [0, 2, 0] }]
+    });
     let scene = floor_probe([0.0, 0.0, 0.0], json!([sphere]));
     Estimate::of(&render(&scene), 0).assert_is(0.25 / 4.0, "sphere overhead");
 }

@@ -11,17 +11,24 @@ use crate::util::folder::{Folder, good_scene, set};
 use crate::util::render::{AssertIs, Estimate, assert_irradiance, floor_probe, merge, pixels, probe, render};
 
 /// 10 candela downwards; 8 (in the plane of horizontal angle 0) or 6 (in that of 90) at 45 degrees; nothing at 90.
-const LAMP: &str = "IESNA:LM-63-2002\n[TEST] none\nTILT=NONE\n1 1000 2.0 3 2 1 2 0.1 0.1 0.0\n0.5 1.0 10\n0 45 90\n0 90\n10 8 0\n10 6 0\n";
+const LAMP: &str = "IESNA:LM-63-2002\n[TEST] none\nTILT=NONE\n1 1000 2.0 3 2 1 2 0.1 0.1 0.0\n0.5 1.0 10\n0 45 90\n\
+                    0 90\n10 8 0\n10 6 0\n";
 
 #[test]
 fn a_measured_light_has_the_intensity_of_its_file() {
     let folder = Folder::new();
     let file = folder.write("lamp.ies", LAMP);
-    let lamp = |turned: f64| json!([{ "type": "ies", "file": file, "position": [0, 1, 0], "intensity": [0.5, 0.5, 0.5], "rotation_degrees": turned }]);
+    let lamp = |turned: f64| {
+        json!([{
+            "type": "ies", "file": file, "position": [0, 1, 0], "intensity": [0.5, 0.5, 0.5], "rotation_degrees": turned
+        }])
+    };
     let angle = 22.5f64.to_radians();
     let fall = 0.5 * angle.cos().powi(3);
     // Half of the way from 0 to 45 degrees.
-    for (at, turned, candela) in [([1.0, 0.0, 0.0], 0.0, 9.0), ([0.0, 0.0, 1.0], 0.0, 8.0), ([0.0, 0.0, -1.0], 90.0, 9.0)] {
+    for (at, turned, candela) in
+        [([1.0, 0.0, 0.0], 0.0, 9.0), ([0.0, 0.0, 1.0], 0.0, 8.0), ([0.0, 0.0, -1.0], 90.0, 9.0)]
+    {
         let mut scene = floor_probe(at.map(|x| x * angle.tan()), json!([]));
         scene["lights"] = lamp(turned);
         assert_irradiance(&scene, candela * fall, &format!("{at:?}"));
@@ -32,12 +39,16 @@ fn a_measured_light_has_the_intensity_of_its_file() {
 /// quarters, else 0.75.
 #[test]
 fn projectors_and_textured_spots_throw_pictures() {
-    let textures = json!({ "board": { "type": "checker", "color0": [0.25, 0.25, 0.25], "color1": [0.75, 0.75, 0.75], "scale": [2, 2] } });
+    let textures = json!({
+        "board": { "type": "checker", "color0": [0.25, 0.25, 0.25], "color1": [0.75, 0.75, 0.75], "scale": [2, 2] }
+    });
     // Above the floor at height 1, looking down with -Z up: u grows with x and v against z, over 2 x 1 of the floor for
     // the projector.
     let lights = [
-        json!({ "type": "projector", "position": [0, 1, 0], "look_at": [0, 0, 0], "irradiance": [2, 2, 2], "texture": "board",
-            "vertical_fov_degrees": 2.0 * 0.5f64.atan().to_degrees(), "aspect": 2 }),
+        json!({
+            "type": "projector", "position": [0, 1, 0], "look_at": [0, 0, 0], "irradiance": [2, 2, 2],
+            "texture": "board", "vertical_fov_degrees": 2.0 * 0.5f64.atan().to_degrees(), "aspect": 2
+        }),
         json!({ "type": "spot", "position": [0, 1, 0], "look_at": [0, 0, 0], "intensity": [2, 2, 2], "texture": "board",
             "cutoff_angle_degrees": 45, "beam_angle_degrees": 45 }),
     ];
@@ -64,7 +75,9 @@ fn projectors_and_textured_spots_throw_pictures() {
 fn wrong_projectors_are_refused_with_their_place() {
     let folder = Folder::new();
     let light = json!({ "type": "projector", "position": [0, 1, 0], "look_at": [0, 0, 0], "vertical_fov_degrees": 40 });
-    let spot = json!({ "type": "spot", "position": [0, 1, 0], "look_at": [0, 0, 0], "intensity": [1, 1, 1], "texture": "tiles" });
+    let spot = json!({
+        "type": "spot", "position": [0, 1, 0], "look_at": [0, 0, 0], "intensity": [1, 1, 1], "texture": "tiles"
+    });
     for (light, key, value) in [
         (&light, "vertical_fov_degrees", json!(180)),
         (&light, "aspect", json!(0)),
@@ -94,10 +107,13 @@ fn a_textured_light_shines_where_its_texture_is_bright() {
     };
     let expected = corner(1.0, 1.0) + (corner(2.0, 2.0) - 2.0 * corner(1.0, 2.0) + corner(1.0, 1.0));
     let emission = json!({ "radiance": [1, 1, 1], "texture": "board" });
-    let quad =
-        json!({ "type": "quad", "material": "black", "origin": [0, 1, 0], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2], "emission": emission });
+    let quad = json!({
+        "type": "quad", "material": "black", "origin": [0, 1, 0], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2],
+        "emission": emission
+    });
     let mesh = json!({
-        "type": "mesh", "material": "black", "emission": emission, "positions": [[0, 1, 0], [2, 1, 0], [2, 1, 2], [0, 1, 2]],
+        "type": "mesh", "material": "black", "emission": emission,
+        "positions": [[0, 1, 0], [2, 1, 0], [2, 1, 2], [0, 1, 2]],
         "triangles": [[0, 1, 2], [0, 2, 3]], "uvs": [[0, 0], [1, 0], [1, 1], [0, 1]]
     });
     for (what, shape) in [("quad", quad), ("mesh", mesh)] {
@@ -122,14 +138,20 @@ fn lamps_inside_objects_light_from_every_place_they_are_put() {
 
 #[test]
 fn a_flat_lamp_that_shines_on_both_sides_does_not_light_itself() {
-    for (material, edge) in
-        [(json!({ "type": "diffuse", "albedo": 0.9 }), [2.0, 0.0, 0.0]), (json!({ "type": "principled" }), [2.0, 0.3, 0.0])]
-    {
-        let quad = json!({ "type": "quad", "material": "m", "edge_u": edge, "transform": [{ "rotate": { "axis": [1, 2, 3], "degrees": 40 } },
-            { "translate": [10.1, 20.7, -3.3] }], "emission": { "radiance": [1, 1, 1], "two_sided": true } });
+    for (material, edge) in [
+        (json!({ "type": "diffuse", "albedo": 0.9 }), [2.0, 0.0, 0.0]),
+        (json!({ "type": "principled" }), [2.0, 0.3, 0.0]),
+    ] {
+        let quad = json!({
+            "type": "quad", "material": "m", "edge_u": edge,
+            "transform": [{ "rotate": { "axis": [1, 2, 3], "degrees": 40 } }, { "translate": [10.1, 20.7, -3.3] }],
+            "emission": { "radiance": [1, 1, 1], "two_sided": true }
+        });
         let camera = json!({ "position": [10.1, 20.7, 1.7], "look_at": [10.1, 20.7, -3.3], "vertical_fov_degrees": 5 });
-        let scene = json!({ "camera": camera, "film": { "width": 16, "height": 16 }, "sampler": { "spp": 64 }, "materials": { "m": material },
-            "shapes": [quad] });
+        let scene = json!({
+            "camera": camera, "film": { "width": 16, "height": 16 }, "sampler": { "spp": 64 },
+            "materials": { "m": material }, "shapes": [quad]
+        });
         for pixel in pixels(&Folder::new().render(&scene)) {
             assert_eq!(pixel, [1.0; 3]);
         }
@@ -170,16 +192,21 @@ fn whitteds_direct_light_of_anything_with_an_extent_is_all_of_it() {
     // The same from an image; from a ball as a lamp, pi (R / d)² cos above a corner of the floor; from a wide sun.
     let folder = Folder::new();
     // Two texels of 128 / 256 * 2^(130 - 128).
-    let image =
-        folder.write("sky.hdr", [&b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n"[..], &[128, 128, 128, 130].repeat(2)].concat());
+    let image = folder.write(
+        "sky.hdr",
+        [&b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n"[..], &[128, 128, 128, 130].repeat(2)].concat(),
+    );
     let mut scene = floor_probe([0.0; 3], json!([]));
     scene["lights"] = json!([{ "type": "environment", "file": image }]);
     direct(scene.clone(), 2.0, "image");
-    let sun = json!({ "type": "directional", "direction": [0.6, -0.8, 0], "irradiance": [1, 1, 1], "angular_diameter_degrees": 30 });
+    let sun = json!({
+        "type": "directional", "direction": [0.6, -0.8, 0], "irradiance": [1, 1, 1], "angular_diameter_degrees": 30
+    });
     scene["lights"] = json!([sun]);
     direct(scene, 0.8 / PI, "sun");
     let lamp = json!({
-        "type": "sphere", "material": "black", "radius": 0.5, "emission": { "radiance": [1, 1, 1] }, "transform": [{ "translate": [1.2, 1.6, 0] }]
+        "type": "sphere", "material": "black", "radius": 0.5, "emission": { "radiance": [1, 1, 1] },
+        "transform": [{ "translate": [1.2, 1.6, 0] }]
     });
     direct(floor_probe([0.0; 3], json!([lamp])), 0.8 / 16.0, "ball");
 }
@@ -190,16 +217,25 @@ fn corner(integrator: Value) -> Value {
         [3.0, 2.0, 4.0],
         [0.0, 0.6, 0.0],
         json!({
-            "materials": { "grey": { "type": "diffuse", "albedo": 0.7 }, "metal": { "type": "conductor", "metal": "silver", "alpha": 0.1 } },
+            "materials": {
+                "grey": { "type": "diffuse", "albedo": 0.7 },
+                "metal": { "type": "conductor", "metal": "silver", "alpha": 0.1 }
+            },
             "shapes": [
                 { "type": "quad", "material": "grey", "origin": [-2, 0, 2], "edge_u": [4, 0, 0], "edge_v": [0, 0, -4] },
                 { "type": "quad", "material": "grey", "origin": [-2, 0, -2], "edge_u": [4, 0, 0], "edge_v": [0, 4, 0] },
                 { "type": "sphere", "material": "metal", "radius": 0.6, "transform": [{ "translate": [0, 0.6, 0] }] },
-                { "type": "sphere", "radius": 0.2, "emission": { "radiance": [20, 18, 15] }, "transform": [{ "translate": [-1, 2, 0.5] }] }
+                {
+                    "type": "sphere", "radius": 0.2, "emission": { "radiance": [20, 18, 15] },
+                    "transform": [{ "translate": [-1, 2, 0.5] }]
+                }
             ]
         }),
     );
-    merge(&mut scene, json!({ "camera": { "vertical_fov_degrees": 40 }, "sampler": { "spp": 16 }, "integrator": { "type": "path" } }));
+    merge(
+        &mut scene,
+        json!({ "camera": { "vertical_fov_degrees": 40 }, "sampler": { "spp": 16 }, "integrator": { "type": "path" } }),
+    );
     merge(&mut scene["integrator"], integrator);
     scene
 }
@@ -218,7 +254,10 @@ fn clamping_takes_only_from_indirect_light_and_never_more_than_the_limit() {
     let mut changed = 0;
     for ((d, l), f) in direct.iter().zip(&limited).zip(&free) {
         // Eight contributions at most of up to 0.05 each.
-        assert!((0..3).all(|c| l[c] <= f[c] * 1.000_01 && l[c] >= d[c] && l[c] <= d[c] + 8.0 * 0.05), "{d:?} {l:?} {f:?}");
+        assert!(
+            (0..3).all(|c| l[c] <= f[c] * 1.000_01 && l[c] >= d[c] && l[c] <= d[c] + 8.0 * 0.05),
+            "{d:?} {l:?} {f:?}"
+        );
         changed += usize::from(l[1] < f[1] * 0.99);
     }
     assert!(changed > 20, "{changed} of {}", free.len());
@@ -243,7 +282,8 @@ fn regularized_caustics_vary_less_and_keep_their_light() {
         let pixels = a.iter().zip(b).chain(c.iter().zip(d)).zip(shades.iter().cycle());
         pixels.map(|((a, b), shade)| f64::from(a[1] - b[1]).powi(2) / shade).sum()
     };
-    let light = |pictures: &[Vec<[f32; 3]>; 4]| -> f64 { pictures.iter().flatten().map(|pixel| f64::from(pixel[1])).sum() };
+    let light =
+        |pictures: &[Vec<[f32; 3]>; 4]| -> f64 { pictures.iter().flatten().map(|pixel| f64::from(pixel[1])).sum() };
     assert!(noise(&rougher) < 0.2 * noise(&free), "{} {}", noise(&rougher), noise(&free));
     assert!((light(&rougher) / light(&free) - 1.0).abs() < 0.05, "{} {}", light(&rougher), light(&free));
 }
@@ -256,7 +296,10 @@ fn assert_fault(folder: &Folder, path: &str, value: &Value, kind: ErrorKind, pla
     let error = folder.compile(&scene).err().unwrap_or_else(|| panic!("{path} compiles with {value}"));
     let message = error.to_string();
     assert_eq!(error.kind(), kind, "{message}");
-    assert!(message.contains(place) && message.contains(word) && message.contains("scene.json"), "{place}, {word}: {message}");
+    assert!(
+        message.contains(place) && message.contains(word) && message.contains("scene.json"),
+        "{place}, {word}: {message}"
+    );
 }
 
 #[test]
@@ -281,7 +324,13 @@ fn wrong_lights_are_refused_with_their_place() {
         ("lights[0].group", json!("key light"), ErrorKind::Scene, "lights[0].group", "key light"),
         ("lights[3].group", json!(""), ErrorKind::Scene, "lights[3].group", "letters"),
         ("shapes[1].emission.group", json!("a.b"), ErrorKind::Scene, "shapes[1].emission.group", "a.b"),
-        ("shapes[1].emission.texture", json!("tile"), ErrorKind::Scene, "shapes[1].emission.texture", "did you mean \"tiles\"?"),
+        (
+            "shapes[1].emission.texture",
+            json!("tile"),
+            ErrorKind::Scene,
+            "shapes[1].emission.texture",
+            "did you mean \"tiles\"?",
+        ),
         ("integrator.clamp", json!(0), ErrorKind::Scene, "integrator.clamp", "0"),
         ("integrator.clamp", json!(-2), ErrorKind::Scene, "integrator.clamp", "-2"),
     ] {
@@ -302,7 +351,11 @@ fn wrong_cameras_are_refused_with_their_place() {
         (json!({ "type": "fisheye" }), "camera", "fisheye"),
         (json!({ "type": "orthographic" }), "camera", "`view_height`"),
         (json!({ "type": "orthographic", "view_height": 0 }), "camera.view_height", "0"),
-        (json!({ "type": "orthographic", "view_height": 1, "vertical_fov_degrees": 30 }), "camera.vertical_fov_degrees", "orthographic"),
+        (
+            json!({ "type": "orthographic", "view_height": 1, "vertical_fov_degrees": 30 }),
+            "camera.vertical_fov_degrees",
+            "orthographic",
+        ),
         (json!({ "type": "environment", "shift": [0, 1] }), "camera.shift", "environment"),
         (json!({ "type": "environment", "pixel_aspect": 1 }), "camera.pixel_aspect", "environment"),
         (json!({ "type": "environment", "lens": { "radius": 1, "focus_distance": 1 } }), "camera.lens", "environment"),
@@ -313,18 +366,42 @@ fn wrong_cameras_are_refused_with_their_place() {
         (json!({ "shutter": [1, 0.5] }), "camera.shutter", "[1.0, 0.5]"),
         (json!({ "shutter": [-1e308, 1e308] }), "camera.shutter", "1e308"),
         (json!({ "motion": [{ "time": 0 }, { "time": 0 }] }), "camera.motion[1].time", "grow"),
-        (json!({ "motion": [{ "time": 0 }, { "time": 1, "transform": [{ "scale": 2 }] }] }), "camera.motion[1].transform", "scaled"),
-        (json!({ "motion": [{ "time": 0, "transform": [{ "scale": [1, 1, -1] }] }] }), "camera.motion[0].transform", "rotation"),
+        (
+            json!({ "motion": [{ "time": 0 }, { "time": 1, "transform": [{ "scale": 2 }] }] }),
+            "camera.motion[1].transform",
+            "scaled",
+        ),
+        (
+            json!({ "motion": [{ "time": 0, "transform": [{ "scale": [1, 1, -1] }] }] }),
+            "camera.motion[0].transform",
+            "rotation",
+        ),
         (json!({ "motion": [{ "when": 0 }] }), "camera.motion[0]", "when"),
-        (json!({ "lens": { "radius": 1, "focus_distance": 1, "blades": { "count": 2 } } }), "camera.lens.blades.count", "2"),
-        (json!({ "lens": { "radius": 1, "focal_length": 0.1, "sensor_distance": 0.05 } }), "camera.lens", "nothing is in focus"),
+        (
+            json!({ "lens": { "radius": 1, "focus_distance": 1, "blades": { "count": 2 } } }),
+            "camera.lens.blades.count",
+            "2",
+        ),
+        (
+            json!({ "lens": { "radius": 1, "focal_length": 0.1, "sensor_distance": 0.05 } }),
+            "camera.lens",
+            "nothing is in focus",
+        ),
         (
             json!({ "lens": { "radius": 1, "focal_length": 0.1, "sensor_distance": 0.2, "focus_distance": 1 } }),
             "camera.lens",
             "one too many",
         ),
-        (json!({ "lens": { "radius": 1, "sensor_height": 0.1, "sensor_distance": 0.2, "focus_distance": 1 } }), "camera.lens", "either"),
-        (json!({ "lens": { "radius": 1, "focal_length": 0.1, "sensor_height": -1 } }), "camera.lens.sensor_height", "-1"),
+        (
+            json!({ "lens": { "radius": 1, "sensor_height": 0.1, "sensor_distance": 0.2, "focus_distance": 1 } }),
+            "camera.lens",
+            "either",
+        ),
+        (
+            json!({ "lens": { "radius": 1, "focal_length": 0.1, "sensor_height": -1 } }),
+            "camera.lens.sensor_height",
+            "-1",
+        ),
     ] {
         assert_fault(&folder, "camera", &camera(value), ErrorKind::Scene, place, word);
     }
@@ -344,9 +421,13 @@ fn a_hidden_lamp_shows_what_is_behind_it() {
                     "integrator": { "type": kind, "hide_emitters": hide },
                     "materials": { "white": { "type": "diffuse", "albedo": 0.8 } },
                     "shapes": [
-                        { "type": "quad", "material": "white", "origin": [-1.2, -1.2, 0], "edge_u": [2.4, 0, 0], "edge_v": [0, 2.4, 0] },
                         {
-                            "type": "quad", "origin": [-0.5, -0.5, 1], "edge_u": [1, 0, 0], "edge_v": [0, 1, 0], "reverse_normal": turned,
+                            "type": "quad", "material": "white", "origin": [-1.2, -1.2, 0], "edge_u": [2.4, 0, 0],
+                            "edge_v": [0, 2.4, 0]
+                        },
+                        {
+                            "type": "quad", "origin": [-0.5, -0.5, 1], "edge_u": [1, 0, 0], "edge_v": [0, 1, 0],
+                            "reverse_normal": turned,
                             "emission": { "radiance": [5, 5, 5] }
                         },
                         // Another lamp behind it.
@@ -359,7 +440,8 @@ fn a_hidden_lamp_shows_what_is_behind_it() {
                 }))
             };
             let (shown, hidden, beyond) = (picture(false, 0.0), picture(true, 0.0), picture(false, 4.8));
-            let of = |image: &steradian::film::Image, x: u32, y: u32| image.pixel(LayerKind::Color, x, y).unwrap().to_vec();
+            let of =
+                |image: &steradian::film::Image, x: u32, y: u32| image.pixel(LayerKind::Color, x, y).unwrap().to_vec();
             assert_eq!((of(&shown, 12, 12)[0] >= 5.0, of(&shown, 12, 12)[3]), (!turned, 1.0), "{kind}");
             assert_eq!(
                 [of(&shown, 0, 0), of(&hidden, 0, 0), of(&beyond, 0, 0)],

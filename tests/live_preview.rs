@@ -94,17 +94,32 @@ fn layers_are_served_in_16_bits_and_pixels_exactly() {
     for (index, channels) in [(0, 4), (1, 1)] {
         let body = client.get(&format!("/layer?index={index}")).body;
         let head: Vec<u8> = [1u32, 3, 2, channels].iter().flat_map(|word| word.to_le_bytes()).collect();
-        let data: Vec<u8> = image.layers[index].data.iter().flat_map(|value| f16::from_f32(*value).to_le_bytes()).collect();
+        let data: Vec<u8> =
+            image.layers[index].data.iter().flat_map(|value| f16::from_f32(*value).to_le_bytes()).collect();
         assert_eq!(body, [head, data].concat(), "{index}");
     }
 
     let pixel = client.get("/pixel?x=2&y=1").json();
-    let shown: Vec<f32> = pixel["layers"][0]["values"].as_array().unwrap().iter().map(|v| v.to_string().parse().unwrap()).collect();
-    assert_eq!((shown, &pixel["layers"][1]), (image.layers[0].data[20..].to_vec(), &json!({ "channels": ["Z"], "values": [0.0] })));
-    let depths: Vec<Value> =
-        [(1, 0), (2, 0), (0, 1)].map(|(x, y)| client.get(&format!("/pixel?x={x}&y={y}")).json()["layers"][1]["values"][0].clone()).into();
+    let shown: Vec<f32> =
+        pixel["layers"][0]["values"].as_array().unwrap().iter().map(|v| v.to_string().parse().unwrap()).collect();
+    assert_eq!(
+        (shown, &pixel["layers"][1]),
+        (image.layers[0].data[20..].to_vec(), &json!({ "channels": ["Z"], "values": [0.0] }))
+    );
+    let depths: Vec<Value> = [(1, 0), (2, 0), (0, 1)]
+        .map(|(x, y)| client.get(&format!("/pixel?x={x}&y={y}")).json()["layers"][1]["values"][0].clone())
+        .into();
     assert_eq!(depths, [json!(1e10), json!("NaN"), json!("-inf")]);
-    for wrong in ["/layer?index=2", "/layer", "/layer?index=-1", "/pixel?x=3&y=0", "/pixel?x=0&y=2", "/pixel?x=1", "/page.html", "/../x"] {
+    for wrong in [
+        "/layer?index=2",
+        "/layer",
+        "/layer?index=-1",
+        "/pixel?x=3&y=0",
+        "/pixel?x=0&y=2",
+        "/pixel?x=1",
+        "/page.html",
+        "/../x",
+    ] {
         assert_eq!(client.get(wrong).status, 404, "{wrong}");
     }
 }
@@ -227,7 +242,9 @@ fn connections_beyond_the_limit_are_turned_away() {
         let mut stream = TcpStream::connect(address).unwrap();
         let mut status = [0; 12];
         // One that is turned away may find the connection closed.
-        let read = stream.write_all(b"GET /state HTTP/1.1\r\nHost: localhost\r\n\r\n").and_then(|()| stream.read_exact(&mut status));
+        let read = stream
+            .write_all(b"GET /state HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            .and_then(|()| stream.read_exact(&mut status));
         read.is_ok() && status == *b"HTTP/1.1 200"
     };
     while !has_room() {
@@ -286,7 +303,10 @@ impl Watched {
         }"#;
         std::fs::write(folder.join("ball.json"), scene).unwrap();
         let mut command = Command::new(env!("CARGO_BIN_EXE_steradian"));
-        command.current_dir(folder).args(["render", "ball.json", "-o", "a.exr", "--float"]).args(arguments.split_whitespace());
+        command
+            .current_dir(folder)
+            .args(["render", "ball.json", "-o", "a.exr", "--float"])
+            .args(arguments.split_whitespace());
         let mut child = Running::start(command.stderr(Stdio::piped()));
         let mut stderr = BufReader::new(child.stderr.take().unwrap());
         let mut line = String::new();
@@ -316,7 +336,10 @@ fn a_render_is_watched_until_it_is_interrupted() {
         if version > have {
             assert_eq!(client.get("/layer?index=0").body.len(), 16 + 24 * 16 * 4 * 2);
             let numbers = &state["statistics"];
-            assert!(numbers["samples_per_second"].as_f64().unwrap() > 0.0 && numbers["left"].as_f64().unwrap() <= 100.0, "{numbers}");
+            assert!(
+                numbers["samples_per_second"].as_f64().unwrap() > 0.0 && numbers["left"].as_f64().unwrap() <= 100.0,
+                "{numbers}"
+            );
             assert!(state["picture_spp"].as_u64().unwrap() >= version, "{state}");
         }
         have = version;
@@ -352,14 +375,22 @@ fn a_port_in_use_ends_the_program_before_the_render() {
     let (_preview, address) = preview();
     let folder = tempfile::tempdir().unwrap();
     let line = format!("render missing.json --preview {}", address.port());
-    assert_eq!(Command::new(env!("CARGO_BIN_EXE_steradian")).args(line.split_whitespace()).output().unwrap().status.code(), Some(4));
+    assert_eq!(
+        Command::new(env!("CARGO_BIN_EXE_steradian")).args(line.split_whitespace()).output().unwrap().status.code(),
+        Some(4)
+    );
     std::fs::write(
         folder.path().join("ball.json"),
-        r#"{ "film": { "width": 8, "height": 8 }, "camera": { "position": [0, 0, 4], "look_at": [0, 0, 0] }, "shapes": [{ "type": "sphere" }], "lights": [{ "type": "environment", "radiance": [1, 1, 1] }] }"#,
+        r#"{ "film": { "width": 8, "height": 8 }, "camera": { "position": [0, 0, 4], "look_at": [0, 0, 0] },
+        "shapes": [{ "type": "sphere" }], "lights": [{ "type": "environment", "radiance": [1, 1, 1] }] }"#,
     )
     .unwrap();
     let line = format!("render ball.json --preview {}", address.port());
-    let output = Command::new(env!("CARGO_BIN_EXE_steradian")).current_dir(&folder).args(line.split_whitespace()).output().unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_steradian"))
+        .current_dir(&folder)
+        .args(line.split_whitespace())
+        .output()
+        .unwrap();
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{stderr}");
     assert!(stderr.contains("--preview") && stderr.contains(&address.to_string()), "{stderr}");

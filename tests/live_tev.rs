@@ -87,7 +87,8 @@ impl Viewer {
                 let (grab, name) = (payload.flag(), payload.text());
                 let size = [payload.int(), payload.int()];
                 let count = payload.int();
-                let channels = payload.texts(count).into_iter().map(|name| (name, vec![0; size[0] * size[1]])).collect();
+                let channels =
+                    payload.texts(count).into_iter().map(|name| (name, vec![0; size[0] * size[1]])).collect();
                 self.packets.push(format!("create {name} {grab}"));
                 let old = self.pictures.insert(name, Picture { size, channels });
                 assert!(old.is_none(), "created twice");
@@ -148,8 +149,14 @@ fn options(address: &str) -> TevOptions {
 /// A picture whose values depend on the seed.
 fn image(size: [u32; 2], seed: u32) -> Image {
     let value = |i: u32| f32::from_bits((i + 1).wrapping_mul(2_654_435_761).wrapping_add(seed));
-    let layer = |kind: LayerKind, channels: u32| Layer::new(kind, (0..size[0] * size[1] * channels).map(value).collect());
-    Image { size, crop: Crop::full(size), layers: vec![layer(LayerKind::Color, 4), layer(LayerKind::N, 3)], ..Image::default() }
+    let layer =
+        |kind: LayerKind, channels: u32| Layer::new(kind, (0..size[0] * size[1] * channels).map(value).collect());
+    Image {
+        size,
+        crop: Crop::full(size),
+        layers: vec![layer(LayerKind::Color, 4), layer(LayerKind::N, 3)],
+        ..Image::default()
+    }
 }
 
 fn snapshot(image: &Image) -> Arc<Snapshot> {
@@ -160,7 +167,9 @@ fn snapshot(image: &Image) -> Arc<Snapshot> {
 fn expected(image: &Image) -> Picture {
     let names = [&["R", "G", "B", "A"][..], &["N.X", "N.Y", "N.Z"]];
     let channels = image.layers.iter().zip(names).flat_map(|(layer, names)| {
-        let plane = |channel: usize| layer.data.iter().skip(channel).step_by(names.len()).map(|value| value.to_bits()).collect();
+        let plane = |channel: usize| {
+            layer.data.iter().skip(channel).step_by(names.len()).map(|value| value.to_bits()).collect()
+        };
         names.iter().enumerate().map(move |(channel, name)| ((*name).to_owned(), plane(channel))).collect::<Vec<_>>()
     });
     Picture { size: image.size.map(|side| side as usize), channels: channels.collect() }
@@ -194,7 +203,11 @@ fn the_picture_in_the_viewer_is_the_one_in_the_file() {
         let (listener, address) = listen();
         let viewer = viewer(listener);
         let line = format!("render ball.json -q --float --layers Z,N,albedo,variance -o a.exr {crop} --tev {address}");
-        let status = Command::new(env!("CARGO_BIN_EXE_steradian")).current_dir(&folder).args(line.split_whitespace()).status().unwrap();
+        let status = Command::new(env!("CARGO_BIN_EXE_steradian"))
+            .current_dir(&folder)
+            .args(line.split_whitespace())
+            .status()
+            .unwrap();
         assert!(status.success());
         let viewer = viewer.join().unwrap();
         assert_eq!(viewer.packets[..2], ["close ball", "create ball true"]);
@@ -212,7 +225,8 @@ fn of_file(path: &std::path::Path) -> Picture {
         FlatSamples::F32(values) => values.iter().map(|value| value.to_bits()).collect(),
         other => panic!("{other:?}"),
     };
-    let channels = layer.channel_data.list.iter().map(|channel| (channel.name.to_string(), plane(&channel.sample_data)));
+    let channels =
+        layer.channel_data.list.iter().map(|channel| (channel.name.to_string(), plane(&channel.sample_data)));
     Picture { size: [layer.size.0, layer.size.1], channels: channels.collect() }
 }
 
@@ -283,7 +297,9 @@ fn a_viewer_that_never_reads_holds_nothing_up() {
     drop(tev);
     // The end of the sender ends the connection, though it had an hour's patience.
     let mut rest = BufReader::new(silent);
-    eventually("closed", || rest.read(&mut [0; 65536]).is_ok_and(|read| read == 0) || rest.get_ref().peer_addr().is_err());
+    eventually("closed", || {
+        rest.read(&mut [0; 65536]).is_ok_and(|read| read == 0) || rest.get_ref().peer_addr().is_err()
+    });
 }
 
 #[test]

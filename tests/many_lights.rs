@@ -15,7 +15,9 @@ fn room() -> Value {
         json!({ "type": "quad", "material": "grey", "origin": [-3, 0, 3], "edge_u": [6, 0, 0], "edge_v": [0, 0, -6] }),
         json!({ "type": "quad", "material": "grey", "origin": [-3, 0, -3], "edge_u": [6, 0, 0], "edge_v": [0, 3, 0] }),
         json!({ "type": "sphere", "material": "metal", "radius": 0.6, "transform": [{ "translate": [-0.8, 0.6, 0] }] }),
-        json!({ "type": "sphere", "material": "glass", "radius": 0.5, "transform": [{ "translate": [0.9, 0.5, 0.6] }] }),
+        json!({
+            "type": "sphere", "material": "glass", "radius": 0.5, "transform": [{ "translate": [0.9, 0.5, 0.6] }]
+        }),
     ];
     let mut lights = vec![json!({ "type": "environment", "radiance": [0.05, 0.05, 0.08] })];
     let kinds = ["sphere", "quad", "disk", "cone", "cube"];
@@ -26,9 +28,15 @@ fn room() -> Value {
         shapes.push(json!({
             "type": kinds[i % 5], "material": "black",
             "emission": { "radiance": [5.0 * power, 4.0 * power, 6.0 * power], "two_sided": i % 2 == 0 },
-            "transform": [{ "scale": rng.range(0.02, 0.1) }, { "rotate": { "axis": [1, 2, 3], "degrees": degrees } }, { "translate": place }]
+            "transform": [
+                { "scale": rng.range(0.02, 0.1) }, { "rotate": { "axis": [1, 2, 3], "degrees": degrees } },
+                { "translate": place }
+            ]
         }));
-        let spot = json!({ "type": "spot", "position": place, "look_at": [0, 0, 0], "intensity": [0.1, 0.1, 0.1], "cutoff_angle_degrees": 10.0 + degrees / 5.0 });
+        let spot = json!({
+            "type": "spot", "position": place, "look_at": [0, 0, 0], "intensity": [0.1, 0.1, 0.1],
+            "cutoff_angle_degrees": 10.0 + degrees / 5.0
+        });
         let point = json!({ "type": "point", "position": place, "intensity": [0.02, 0.03, 0.02] });
         lights.extend(if i % 3 == 0 { Some(spot) } else { (i % 3 == 1).then_some(point) });
     }
@@ -39,7 +47,8 @@ fn room() -> Value {
         "integrator": { "type": "path", "max_depth": 4 },
         "materials": {
             "grey": { "type": "diffuse", "albedo": 0.6 }, "black": { "type": "diffuse", "albedo": 0 },
-            "metal": { "type": "conductor", "metal": "silver", "alpha": 0.3 }, "glass": { "type": "dielectric", "alpha": 0.3 }
+            "metal": { "type": "conductor", "metal": "silver", "alpha": 0.3 },
+            "glass": { "type": "dielectric", "alpha": 0.3 }
         },
         "shapes": shapes,
         "lights": lights
@@ -54,7 +63,11 @@ fn the_picture_does_not_depend_on_how_lights_are_chosen() {
             .map(|seed| {
                 let mut scene = scene.clone();
                 scene["integrator"]["strategy"] = json!(strategy);
-                let overrides = Overrides { threads: Some(2), seed: Some(seed + 100 * strategy.len() as u64), ..Overrides::default() };
+                let overrides = Overrides {
+                    threads: Some(2),
+                    seed: Some(seed + 100 * strategy.len() as u64),
+                    ..Overrides::default()
+                };
                 let mut prepared = prepare(&scene, &overrides);
                 assert_eq!(prepared.scene.lights.selection(), LightSelection::Tree);
                 let lights = prepared.scene.lights.lights().to_vec();

@@ -7,7 +7,8 @@ use crate::util::render::{AssertIs, Estimate, probe, render};
 /// A square seen from the front or the back, under a white sky, with the material "m".
 fn square(from_front: bool, rest: Value) -> Value {
     let mut scene = probe([0.3, 0.4, if from_front { 5.0 } else { -5.0 }], [0.01, 0.02, 0.0], rest);
-    scene["shapes"] = json!([{ "type": "quad", "material": "m", "origin": [-1, -1, 0], "edge_u": [2, 0, 0], "edge_v": [0, 2, 0] }]);
+    scene["shapes"] =
+        json!([{ "type": "quad", "material": "m", "origin": [-1, -1, 0], "edge_u": [2, 0, 0], "edge_v": [0, 2, 0] }]);
     scene["lights"] = json!([{ "type": "environment", "radiance": [1, 1, 1] }]);
     scene["sampler"]["spp"] = json!(256);
     scene
@@ -37,7 +38,8 @@ fn a_mix_of_mixes_is_mixed_independently() {
     // A quarter of white: the choices within must not depend on the choices without.
     let materials = json!({
         "black": { "type": "diffuse", "albedo": 0.0 }, "white": { "type": "diffuse", "albedo": 1.0 },
-        "half": { "type": "mix", "materials": ["black", "white"] }, "m": { "type": "mix", "materials": ["black", "half"] }
+        "half": { "type": "mix", "materials": ["black", "white"] },
+        "m": { "type": "mix", "materials": ["black", "half"] }
     });
     look(true, materials).assert_is(0.25, "nested mix");
 }
@@ -96,11 +98,15 @@ fn roughness_and_colours_can_be_textures() {
         let mut textured = constant.clone();
         let range = json!({ "texture": "tiles", "range": [0, 10] });
         textured[key] = if key == "exponent" { range } else { json!({ "texture": "tiles" }) };
-        let textures = json!({ "tiles": { "type": "checker", "color0": [0.6, 0.6, 0.6], "color1": [0, 0, 0], "scale": [1, 1] } });
+        let textures =
+            json!({ "tiles": { "type": "checker", "color0": [0.6, 0.6, 0.6], "color1": [0, 0, 0], "scale": [1, 1] } });
         let see = |material: &Value| {
             let mut scene = square(
                 true,
-                json!({ "textures": textures, "materials": { "m": material, "gold": { "type": "conductor", "metal": "gold", "roughness": 0.5 } } }),
+                json!({
+                    "textures": textures,
+                    "materials": { "m": material, "gold": { "type": "conductor", "metal": "gold", "roughness": 0.5 } }
+                }),
             );
             scene["camera"]["look_at"] = json!([0.5, 0.5, 0.0]);
             scene["sampler"]["spp"] = json!(64);
@@ -131,7 +137,9 @@ fn see_tiled(material: &Value) -> Estimate {
     let mut scene = square(
         true,
         json!({
-            "textures": { "tiles": { "type": "checker", "color0": [0.5, 0.5, 0.5], "color1": [0, 0, 0], "scale": [1, 1] } },
+            "textures": {
+                "tiles": { "type": "checker", "color0": [0.5, 0.5, 0.5], "color1": [0, 0, 0], "scale": [1, 1] }
+            },
             "materials": { "m": material, "base": { "type": "diffuse", "albedo": [0.1, 0.7, 0.3] } }
         }),
     );
@@ -171,7 +179,10 @@ fn indices_of_refraction_can_be_textures() {
     for (constant, rest) in [
         (json!({ "type": "thin_dielectric", "ior": 1.5 }), json!({ "ior": range })),
         (json!({ "type": "principled", "ior": 1.5, "base_color": 0.2 }), json!({ "ior": range })),
-        (json!({ "type": "principled", "ior": 1.5, "transmission": 1, "thin": true, "base_color": 0.2 }), json!({ "ior": range })),
+        (
+            json!({ "type": "principled", "ior": 1.5, "transmission": 1, "thin": true, "base_color": 0.2 }),
+            json!({ "ior": range }),
+        ),
     ] {
         let mut textured = constant.clone();
         textured["ior"] = rest["ior"].clone();
@@ -206,7 +217,8 @@ fn a_coat_over_what_consists_of_others_coats_the_parts() {
 
 /// The square seen under a directional light from the right.
 fn lit_from_the_right(material: &Value) -> f64 {
-    let textures = json!({ "half": { "type": "checker", "color0": [0.5, 0.5, 0.5], "color1": [0, 0, 0], "scale": [1, 1] } });
+    let textures =
+        json!({ "half": { "type": "checker", "color0": [0.5, 0.5, 0.5], "color1": [0, 0, 0], "scale": [1, 1] } });
     let mut scene = square(true, json!({ "textures": textures, "materials": { "m": material } }));
     scene["camera"]["look_at"] = json!([0.5, 0.5, 0.0]);
     scene["lights"] = json!([{ "type": "directional", "direction": [-0.5, 0, -1], "irradiance": [1, 1, 1] }]);
@@ -235,7 +247,8 @@ fn each_axis_of_a_roughness_can_be_a_texture() {
                 let close = |a: f64, b: f64| (a - b).abs() < 2e-3 * b;
                 assert!(!close(along, across), "{key} {kind}: {along} {across}");
                 assert!(
-                    close(lit(json!({ "u": half, "v": 0.2 })), along) && close(lit(json!({ "u": 0.2, "v": half })), across),
+                    close(lit(json!({ "u": half, "v": 0.2 })), along)
+                        && close(lit(json!({ "u": 0.2, "v": half })), across),
                     "{key} {kind}"
                 );
                 assert!(close(lit(json!({ "u": half, "v": half })), lit(json!(0.5))), "{key} {kind}");
@@ -250,7 +263,8 @@ fn a_metal_with_beckmanns_microfacets_has_their_density() {
     // at these angles.
     let lit = |distribution: &str| {
         lit_from_the_right(&json!({
-            "type": "conductor", "eta": [1e-6, 1e-6, 1e-6], "k": [1, 1, 1], "alpha": 0.3, "distribution": distribution, "multiscatter": false
+            "type": "conductor", "eta": [1e-6, 1e-6, 1e-6], "k": [1, 1, 1], "alpha": 0.3, "distribution": distribution,
+            "multiscatter": false
         }))
     };
     let unit = |v: [f64; 3]| v.map(|x| x / v.iter().map(|x| x * x).sum::<f64>().sqrt());

@@ -1,4 +1,4 @@
-//! Media that overlap, absorb and part colours, against closed forms and against boundaries modelled one by one.
+//! Media that overlap, absorb and part colours, against closed forms.
 
 use serde_json::{Value, json};
 use steradian::ErrorKind;
@@ -24,7 +24,10 @@ fn assert_close(found: [f64; 3], expected: [f64; 3], tolerance: f64, what: &str)
 
 /// A block with its lower and upper z, 4 wide.
 fn block(material: &str, z: [f64; 2]) -> Value {
-    json!({ "type": "cube", "material": material, "transform": [{ "scale": [2, 2, 0.5 * (z[1] - z[0])] }, { "translate": [0, 0, 0.5 * (z[0] + z[1])] }] })
+    json!({
+        "type": "cube", "material": material,
+        "transform": [{ "scale": [2, 2, 0.5 * (z[1] - z[0])] }, { "translate": [0, 0, 0.5 * (z[0] + z[1])] }]
+    })
 }
 
 /// A white sky seen through blocks along -z from `z`, along the axis or not.
@@ -80,7 +83,8 @@ fn a_slab_of_absorbing_glass_gives_the_closed_form() {
 #[test]
 fn color_and_distance_say_what_is_left() {
     for (distance, thickness) in [(1.0, 0.5), (0.25, 0.5), (8.0, 2.0)] {
-        let medium = json!({ "m": { "type": "dielectric", "ior": 1, "absorption": { "color": RED, "distance": distance } } });
+        let medium =
+            json!({ "m": { "type": "dielectric", "ior": 1, "absorption": { "color": RED, "distance": distance } } });
         let found = exact(&through(5.0, medium, json!([block("m", [0.0, thickness])])));
         assert_close(found, left(RED, thickness / distance), 1e-5, "thickness in distances");
     }
@@ -144,110 +148,6 @@ fn exact_whitted(mut scene: Value) -> [f64; 3] {
     exact(&scene)
 }
 
-/// A ball of glass with a smaller one of water in it, between two coloured lamps and a mirror.
-fn balls(materials: Value, balls: Value) -> Value {
-    let mut scene = json!({
-        "film": { "width": 32, "height": 32, "filter": { "type": "box" } },
-        "camera": { "position": [0, 0.3, 6], "look_at": [0, 0, 0], "vertical_fov_degrees": 24 },
-        "sampler": { "type": "independent", "spp": 16 },
-        "integrator": { "type": "path", "max_depth": 24, "rr_depth": 6 },
-        "materials": { "black": { "type": "diffuse", "albedo": 0 }, "white": { "type": "diffuse", "albedo": 0.9 } },
-        "lights": [{ "type": "environment", "radiance": [0.2, 0.3, 0.5] }]
-    });
-    merge(&mut scene["materials"], materials);
-    let mut shapes = vec![
-        json!({ "type": "quad", "origin": [-3, -3, -4], "edge_u": [3, 0, 0], "edge_v": [0, 6, 0], "emission": { "radiance": [3, 1, 0.2] }, "material": "black" }),
-        json!({ "type": "quad", "origin": [-3, -1.2, 3], "edge_u": [6, 0, 0], "edge_v": [0, 0, -7], "material": "white" }),
-    ];
-    shapes.extend(balls.as_array().unwrap().iter().cloned());
-    scene["shapes"] = json!(shapes);
-    scene
-}
-
-/// Asserts that nearly all pixels are equal: paths are the same but for roundings, which now and then change a choice.
-#[track_caller]
-fn assert_same_picture(a: &Value, b: &Value, what: &str) {
-    let (a, b) = (render(a), render(b));
-    let differ = pixels(&a).zip(pixels(&b)).filter(|(p, q)| (0..3).any(|c| (p[c] - q[c]).abs() > 1e-3 * (p[c] + q[c])));
-    let share = differ.count() as f64 / pixels(&a).count() as f64;
-    assert!(share < 0.01, "{what}: {share} of the pixels differ");
-}
-
-#[test]
-fn overlapping_media_look_like_boundaries_modelled_one_by_one() {
-    let sphere = |material: &str, radius: f64, reverse: bool| json!({ "type": "sphere", "radius": radius, "material": material, "reverse_normal": reverse });
-    for roughness in [0.0, 0.3] {
-        // Every boundary by itself: the outer one of glass in air, the inner one of water in glass.
-        let boundary = |ior: f64| json!({ "type": "dielectric", "ior": ior, "roughness": roughness });
-        let apart = balls(
-            json!({ "outer": boundary(1.5), "inner": boundary(1.33 / 1.5) }),
-            json!([sphere("outer", 1.0, false), sphere("inner", 0.8, false)]),
-        );
-        // Media: solid glass that water of a higher priority displaces.
-        let medium = |ior: f64, priority: i32| json!({ "type": "dielectric", "ior": ior, "roughness": roughness, "priority": priority });
-        let solid = balls(
-            json!({ "glass": medium(1.5, 1), "water": medium(1.33, 2) }),
-            json!([sphere("glass", 1.0, false), sphere("water", 0.8, false)]),
-        );
-        assert_same_picture(&apart, &solid, &format!("solid glass, roughness {roughness}"));
-        if roughness > 0.0 {
-            continue;
-        }
-        // Hollow glass: water reaches into the wall of hollow glass, which counts there. (With the other side as its
-        // front a rough surface takes other samples.)
-        let hollow = balls(
-            json!({ "glass": medium(1.5, 2), "water": medium(1.33, 1) }),
-            json!([sphere("glass", 1.0, false), sphere("glass", 0.8, true), sphere("water", 0.9, false)]),
-        );
-        assert_same_picture(&apart, &hollow, &format!("hollow glass, roughness {roughness}"));
-        // A gap, which wrong priorities or no overlap leave, looks different.
-        let mut gap = hollow.clone();
-        gap["shapes"][4]["radius"] = json!(0.7);
-        let differ = pixels(&render(&gap)).zip(pixels(&render(&apart))).filter(|(p, q)| (p[0] - q[0]).abs() > 0.05).count();
-        assert!(differ > 50, "{differ}");
-    }
-}
-
-#[test]
-fn clear_nested_media_vanish_in_a_white_environment() {
-    let sphere = |material: &str, radius: f64, x: f64, reverse: bool| json!({ "type": "sphere", "radius": radius, "material": material, "reverse_normal": reverse, "transform": [{ "translate": [x, 0, 0] }] });
-    let mut scene = json!({
-        "film": { "width": 24, "height": 24, "filter": { "type": "box" } },
-        "camera": { "position": [0, 0, 6], "look_at": [0, 0, 0], "vertical_fov_degrees": 18 },
-        "sampler": { "type": "independent", "spp": 256 },
-        "integrator": { "type": "path", "max_depth": 1024, "rr_depth": 1000 },
-        "materials": {
-            "glass": { "type": "dielectric", "ior": 1.5, "priority": 2 },
-            "water": { "type": "dielectric", "ior": 1.33, "priority": 1 },
-            "ice": { "type": "dielectric", "ior": 1.31, "priority": 3 },
-            "prism": { "type": "dielectric", "ior": 1.6, "abbe": 20, "priority": 4 },
-            "bubble": { "type": "dielectric", "ior": 1, "priority": 5 }
-        },
-        "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
-    });
-    // A glass of water with ice that sticks out through the wall, a prism in it and a bubble in all of them.
-    scene["shapes"] = json!([
-        sphere("glass", 1.0, 0.0, false),
-        sphere("glass", 0.8, 0.0, true),
-        sphere("water", 0.9, 0.0, false),
-        sphere("ice", 0.4, 0.7, false),
-        sphere("prism", 0.3, 0.2, false),
-        sphere("bubble", 0.2, 0.4, false)
-    ]);
-    let image = render(&scene);
-    for c in 0..3 {
-        // Total reflection holds few paths for ever: 1024 segments are nearly always enough.
-        let e = Estimate::of(&image, c);
-        assert!((e.mean - 1.0).abs() <= 5.5 * e.error + 1e-4, "channel {c}: {e:?}");
-    }
-    // Without dispersion nothing is left to chance.
-    scene["materials"]["prism"]["abbe"] = Value::Null;
-    scene["materials"]["prism"].as_object_mut().unwrap().remove("abbe");
-    scene["sampler"]["spp"] = json!(64);
-    let worst = pixels(&render(&scene)).map(|p| (p[1] - 1.0).abs()).fold(0.0, f32::max);
-    assert!(worst < 0.05, "{worst}");
-}
-
 #[test]
 fn light_within_a_medium_is_absorbed_on_its_way_to_and_from_a_surface() {
     // A point lamp 1 above a white floor, a camera 2 away, all within a medium: I / pi times what is left after 3.
@@ -262,7 +162,10 @@ fn light_within_a_medium_is_absorbed_on_its_way_to_and_from_a_surface() {
                 "paper": { "type": "diffuse_transmission", "reflectance": 0.25, "transmittance": 0.75 }
             },
             "shapes": [
-                { "type": "quad", "material": "white", "origin": [-9, 0, 9], "edge_u": [18, 0, 0], "edge_v": [0, 0, -18] },
+                {
+                    "type": "quad", "material": "white", "origin": [-9, 0, 9], "edge_u": [18, 0, 0],
+                    "edge_v": [0, 0, -18]
+                },
                 { "type": "sphere", "radius": 50, "material": "m" }
             ],
             "lights": [{ "type": "point", "position": [0, 1, 0], "intensity": [1, 1, 1] }]
@@ -299,10 +202,19 @@ fn a_lamp_in_a_medium_is_as_bright_by_every_strategy() {
             json!({
                 "sampler": { "spp": 256 },
                 "integrator": { "type": "path", "max_depth": 2, "strategy": strategy },
-                "materials": { "white": { "type": "diffuse", "albedo": 1 }, "black": { "type": "diffuse", "albedo": 0 }, "m": medium },
+                "materials": {
+                    "white": { "type": "diffuse", "albedo": 1 }, "black": { "type": "diffuse", "albedo": 0 },
+                    "m": medium
+                },
                 "shapes": [
-                    { "type": "quad", "material": "white", "origin": [-9, 0, 9], "edge_u": [18, 0, 0], "edge_v": [0, 0, -18] },
-                    { "type": "sphere", "radius": 0.02, "material": "black", "emission": { "radiance": [1e4, 1e4, 1e4] }, "transform": [{ "translate": [0, 2, 0] }] },
+                    {
+                        "type": "quad", "material": "white", "origin": [-9, 0, 9], "edge_u": [18, 0, 0],
+                        "edge_v": [0, 0, -18]
+                    },
+                    {
+                        "type": "sphere", "radius": 0.02, "material": "black",
+                        "emission": { "radiance": [1e4, 1e4, 1e4] }, "transform": [{ "translate": [0, 2, 0] }]
+                    },
                     { "type": "sphere", "radius": 50, "material": "m" }
                 ]
             }),
@@ -352,7 +264,8 @@ fn a_camera_starts_in_the_media_around_it() {
         // The same as parts of a moved instance.
         scene["objects"] = json!({ "balls": { "shapes": scene["shapes"] } });
         scene["shapes"] = json!([]);
-        scene["instances"] = json!([{ "object": "balls", "transform": [{ "rotate": { "axis": [1, 2, 3], "degrees": 40 } }] }]);
+        scene["instances"] =
+            json!([{ "object": "balls", "transform": [{ "rotate": { "axis": [1, 2, 3], "degrees": 40 } }] }]);
         assert_close(exact(&scene), expected, 1e-4, &format!("instance from {z}"));
     }
 }
@@ -401,15 +314,26 @@ fn a_prism_parts_colours_by_snells_law() {
             "transform": [{ "translate": [-far * turned.sin(), 0, -far * turned.cos()] }] });
         let (x0, x1) = (-2.0, 1.0);
         let at = |x: f64| x * tilt.tan();
-        let wedge = json!({ "type": "mesh", "material": "prism", "positions": [
-            [x0, -1, 2], [x1, -1, 2], [x1, 1, 2], [x0, 1, 2], [x0, -1, at(x0)], [x1, -1, at(x1)], [x1, 1, at(x1)], [x0, 1, at(x0)]],
-            "triangles": [[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6], [0, 5, 1], [0, 4, 5], [3, 2, 6], [3, 6, 7], [1, 5, 6], [1, 6, 2], [0, 3, 7], [0, 7, 4]] });
+        let wedge = json!({
+            "type": "mesh", "material": "prism",
+            "positions": [
+                [x0, -1, 2], [x1, -1, 2], [x1, 1, 2], [x0, 1, 2], [x0, -1, at(x0)], [x1, -1, at(x1)], [x1, 1, at(x1)],
+                [x0, 1, at(x0)]
+            ],
+            "triangles": [
+                [0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6], [0, 5, 1], [0, 4, 5], [3, 2, 6], [3, 6, 7], [1, 5, 6],
+                [1, 6, 2], [0, 3, 7], [0, 7, 4]
+            ]
+        });
         let mut scene = probe(
             [0.0, 0.0, 5.0],
             [0.0; 3],
             json!({
                 "integrator": { "type": "path", "max_depth": 3 },
-                "materials": { "black": { "type": "diffuse", "albedo": 0 }, "prism": { "type": "dielectric", "ior": ior, "abbe": abbe } }
+                "materials": {
+                    "black": { "type": "diffuse", "albedo": 0 },
+                    "prism": { "type": "dielectric", "ior": ior, "abbe": abbe }
+                }
             }),
         );
         scene["shapes"] = json!([lamp, wedge]);
@@ -439,17 +363,57 @@ fn media_that_make_no_sense() {
         ("materials.glass.absorption", json!([1, 2, 3]), "materials.glass.absorption[0]", "1"),
         ("materials.glass.absorption", json!({ "distance": 1 }), "materials.glass.absorption", "`color`"),
         ("materials.glass.absorption", json!({ "color": tint, "depth": 1 }), "materials.glass.absorption", "`depth`"),
-        ("materials.glass.absorption", absorption(json!([0, 1, 1]), json!(1)), "materials.glass.absorption.color", "above 0 and at most 1"),
-        ("materials.glass.absorption", absorption(json!([-0.1, 1, 1]), json!(1)), "materials.glass.absorption.color", "-0.1"),
-        ("materials.glass.absorption", absorption(json!([1, 1, 1.01]), json!(1)), "materials.glass.absorption.color", "1.01"),
-        ("materials.glass.absorption", absorption(json!([1, 1e39, 1]), json!(1)), "materials.glass.absorption.color", "inf"),
+        (
+            "materials.glass.absorption",
+            absorption(json!([0, 1, 1]), json!(1)),
+            "materials.glass.absorption.color",
+            "above 0 and at most 1",
+        ),
+        (
+            "materials.glass.absorption",
+            absorption(json!([-0.1, 1, 1]), json!(1)),
+            "materials.glass.absorption.color",
+            "-0.1",
+        ),
+        (
+            "materials.glass.absorption",
+            absorption(json!([1, 1, 1.01]), json!(1)),
+            "materials.glass.absorption.color",
+            "1.01",
+        ),
+        (
+            "materials.glass.absorption",
+            absorption(json!([1, 1e39, 1]), json!(1)),
+            "materials.glass.absorption.color",
+            "inf",
+        ),
         ("materials.glass.absorption", absorption(tint.clone(), json!(0)), "materials.glass.absorption.distance", "0"),
-        ("materials.glass.absorption", absorption(tint.clone(), json!(-2)), "materials.glass.absorption.distance", "-2"),
-        ("materials.glass.absorption", absorption(tint.clone(), json!(1e39)), "materials.glass.absorption.distance", "inf"),
-        ("materials.glass.absorption", absorption(tint, json!(1e-42)), "materials.glass.absorption.distance", "too small"),
+        (
+            "materials.glass.absorption",
+            absorption(tint.clone(), json!(-2)),
+            "materials.glass.absorption.distance",
+            "-2",
+        ),
+        (
+            "materials.glass.absorption",
+            absorption(tint.clone(), json!(1e39)),
+            "materials.glass.absorption.distance",
+            "inf",
+        ),
+        (
+            "materials.glass.absorption",
+            absorption(tint, json!(1e-42)),
+            "materials.glass.absorption.distance",
+            "too small",
+        ),
         ("materials.glass.abbe", json!(0), "materials.glass.abbe", "from 1 to 1000"),
         ("materials.glass.abbe", json!(1001), "materials.glass.abbe", "from 1 to 1000"),
-        ("materials.glass", json!({ "type": "dielectric", "ior": 10, "abbe": 1 }), "materials.glass.abbe", "indices of refraction"),
+        (
+            "materials.glass",
+            json!({ "type": "dielectric", "ior": 10, "abbe": 1 }),
+            "materials.glass.abbe",
+            "indices of refraction",
+        ),
         ("materials.glass", json!({ "type": "dielectric", "ior": 11, "priority": 1 }), "materials.glass.ior", "11"),
     ]);
     let mut scene = good_scene();
@@ -458,9 +422,11 @@ fn media_that_make_no_sense() {
     folder.compile(&scene).unwrap();
     set(&mut scene, "materials.m", json!({ "type": "mix", "materials": ["glass", "Gold"] }));
     folder.compile(&scene).unwrap();
-    for other in
-        [json!({ "type": "dielectric", "priority": 2 }), json!({ "type": "thin_dielectric" }), json!({ "type": "diffuse_transmission" })]
-    {
+    for other in [
+        json!({ "type": "dielectric", "priority": 2 }),
+        json!({ "type": "thin_dielectric" }),
+        json!({ "type": "diffuse_transmission" }),
+    ] {
         set(&mut scene, "materials.other", other);
         set(&mut scene, "materials.m", json!({ "type": "mix", "materials": ["glass", "other"] }));
         assert_error(&folder, &scene, ErrorKind::Scene, &["materials.m: ", "same medium"]);
@@ -468,6 +434,10 @@ fn media_that_make_no_sense() {
     set(&mut scene, "materials.m", json!({ "type": "two_sided", "front": "glass", "back": "Gold" }));
     assert_error(&folder, &scene, ErrorKind::Scene, &["materials.m.front: ", "lets light through"]);
     set(&mut scene, "materials.m", Value::Null);
-    set(&mut scene, "shapes[0]", json!({ "type": "sphere", "material": "glass", "emission": { "radiance": [1, 1, 1] } }));
+    set(
+        &mut scene,
+        "shapes[0]",
+        json!({ "type": "sphere", "material": "glass", "emission": { "radiance": [1, 1, 1] } }),
+    );
     assert_error(&folder, &scene, ErrorKind::Scene, &["shapes[0]: ", "medium", "light"]);
 }

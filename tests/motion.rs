@@ -66,19 +66,26 @@ fn what_turns_about_its_centre_stays_in_place_in_every_accelerator() {
     let scene = json!({
         "camera": { "position": [0, 0, 9], "look_at": [0, 0, 0] },
         "shapes": [
-            { "type": "sphere", "radius": 0.8, "transform": [{ "translate": centre }], "motion": [{ "time": 0 }, { "time": 1, "transform": in_place }] },
+            {
+                "type": "sphere", "radius": 0.8, "transform": [{ "translate": centre }],
+                "motion": [{ "time": 0 }, { "time": 1, "transform": in_place }]
+            },
             {
                 "type": "sphere", "radius": 0.5,
                 "motion": [
                     { "time": 0, "transform": [{ "translate": [2, 0, 0] }] },
-                    { "time": 1, "transform": [{ "translate": [2, 0, 0] }, { "rotate": { "axis": [0, 0, 1], "degrees": 540 } }] }
+                    {
+                        "time": 1,
+                        "transform": [{ "translate": [2, 0, 0] }, { "rotate": { "axis": [0, 0, 1], "degrees": 540 } }]
+                    }
                 ]
             }
         ],
         "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
     });
     let scene = Folder::new().compile(&scene).unwrap();
-    let accelerators = AccelKind::ALL.iter().map(|&(kind, _)| build(kind, &scene.geometry, 1).unwrap()).collect::<Vec<_>>();
+    let accelerators =
+        AccelKind::ALL.iter().map(|&(kind, _)| build(kind, &scene.geometry, 1).unwrap()).collect::<Vec<_>>();
     let mut rng = Rng::new(7);
     let mut hits = [0; 2];
     for i in 0..6_000 {
@@ -121,8 +128,13 @@ fn passing_card(shapes: Value, rest: Value) -> Value {
 
 #[test]
 fn a_card_is_seen_as_long_as_it_is_there() {
-    let card = json!({ "type": "quad", "material": "black", "origin": [-0.5, -1, 0], "edge_u": [1, 0, 0], "edge_v": [0, 2, 0] });
-    let path = json!([{ "time": 0, "transform": [{ "translate": [-1, 0, 0] }] }, { "time": 1, "transform": [{ "translate": [1, 0, 0] }] }]);
+    let card = json!({
+        "type": "quad", "material": "black", "origin": [-0.5, -1, 0], "edge_u": [1, 0, 0], "edge_v": [0, 2, 0]
+    });
+    let path = json!([
+        { "time": 0, "transform": [{ "translate": [-1, 0, 0] }] },
+        { "time": 1, "transform": [{ "translate": [1, 0, 0] }] }
+    ]);
     let mut moving = card.clone();
     moving["motion"] = path.clone();
     let ball = json!({ "type": "sphere", "material": "black", "radius": 0.5, "motion": path });
@@ -137,11 +149,17 @@ fn a_card_is_seen_as_long_as_it_is_there() {
         ("deforming mesh", passing_card(json!([deforming]), json!({}))),
         (
             "instance",
-            passing_card(json!([]), json!({ "objects": { "o": { "shapes": [card] } }, "instances": [{ "object": "o", "motion": path }] })),
+            passing_card(
+                json!([]),
+                json!({ "objects": { "o": { "shapes": [card] } }, "instances": [{ "object": "o", "motion": path }] }),
+            ),
         ),
         (
             "shape in an instance",
-            passing_card(json!([]), json!({ "objects": { "o": { "shapes": [moving] } }, "instances": [{ "object": "o" }] })),
+            passing_card(
+                json!([]),
+                json!({ "objects": { "o": { "shapes": [moving] } }, "instances": [{ "object": "o" }] }),
+            ),
         ),
     ];
     for (what, scene) in scenes {
@@ -163,7 +181,9 @@ fn what_cannot_move_is_refused_with_its_place() {
         (json!({ "type": "sphere", "motion": [still, still] }), "shapes[0].motion[1].time", "grow"),
         (json!({ "type": "sphere", "motion": [still, shifted], "emission": lamp }), "shapes[0].motion", "light"),
         (
-            json!({ "type": "mesh", "positions": triangle, "triangles": [[0, 1, 2]], "deform_positions": [[[0, 0, 0]]] }),
+            json!({
+                "type": "mesh", "positions": triangle, "triangles": [[0, 1, 2]], "deform_positions": [[[0, 0, 0]]]
+            }),
             "shapes[0]",
             "1 for 3 vertices",
         ),

@@ -8,15 +8,17 @@ use crate::util::program::{SCENE, run, stderr_of, steradian};
 
 /// A small scene with changes.
 fn scene(change: impl FnOnce(&mut Value)) -> String {
-    let mut scene: Value = serde_json::from_str(&SCENE.lines().filter(|line| !line.contains("//")).collect::<String>()).unwrap();
+    let mut scene: Value =
+        serde_json::from_str(&SCENE.lines().filter(|line| !line.contains("//")).collect::<String>()).unwrap();
     change(&mut scene);
     scene.to_string()
 }
 
 /// Whether some line could be taken for one of the farm's, or a character for one that steers a terminal.
 fn is_harmless(text: &str) -> bool {
-    let ours =
-        |line: &str| line.starts_with("openjd_fail: ") || line.starts_with("openjd_status: rendering") || line.starts_with("Error: ");
+    let ours = |line: &str| {
+        line.starts_with("openjd_fail: ") || line.starts_with("openjd_status: rendering") || line.starts_with("Error: ")
+    };
     let rest = |line: &str| if ours(line) { line.split_once(' ').unwrap().1.to_owned() } else { line.to_owned() };
     text.lines().all(|line| ["openjd_", "Progress: 100", "Error:"].iter().all(|word| !rest(line).contains(word)))
         && !text.contains(|c: char| c.is_control() && c != '\n')
@@ -32,8 +34,11 @@ fn names_steer_neither_farms_nor_terminals() {
         scene["materials"][name] = json!({ "type": "mirror" });
     });
     let missing = scene(|scene| scene["shapes"][0] = json!({ "type": "mesh", "file": format!("{name}.obj") }));
-    let xml = "<scene version=\"3.0.0\"><sensor type=\"perspective\"/><shape type=\"sphere\"><string name=\"a&#10;openjd_env: x&#27;[2J\" value=\"b\"/></shape></scene>";
-    for (file, text) in [("unknown.json", &*unknown), ("named.json", &named), ("missing.json", &missing), ("import.xml", xml)] {
+    let xml = "<scene version=\"3.0.0\"><sensor type=\"perspective\"/><shape type=\"sphere\"><string \
+               name=\"a&#10;openjd_env: x&#27;[2J\" value=\"b\"/></shape></scene>";
+    for (file, text) in
+        [("unknown.json", &*unknown), ("named.json", &named), ("missing.json", &missing), ("import.xml", xml)]
+    {
         std::fs::write(folder.path().join(file), text).unwrap();
         for command in [
             "render FILE -o a.exr --spp 1 --progress openjd",
@@ -64,7 +69,8 @@ fn names_steer_neither_farms_nor_terminals() {
 /// A light in a group whose name has a number of letters.
 fn grouped(letters: usize) -> String {
     scene(|scene| {
-        scene["lights"] = json!([{ "type": "point", "position": [0, 0, 4], "intensity": [9, 9, 9], "group": "g".repeat(letters) }]);
+        scene["lights"] =
+            json!([{ "type": "point", "position": [0, 0, 4], "intensity": [9, 9, 9], "group": "g".repeat(letters) }]);
         scene["outputs"] = json!([{ "file": "a.exr", "layers": ["light_groups"] }]);
     })
 }
@@ -86,7 +92,11 @@ fn long_names_are_marked_in_files_or_refused() {
     std::fs::write(at("s.json"), grouped(249)).unwrap();
     for command in ["render s.json", "info s.json"] {
         let output = run(folder.path(), command);
-        assert!(output.status.code() == Some(3) && stderr_of(&output).contains("s.json: lights[0].group: "), "{}", stderr_of(&output));
+        assert!(
+            output.status.code() == Some(3) && stderr_of(&output).contains("s.json: lights[0].group: "),
+            "{}",
+            stderr_of(&output)
+        );
     }
 }
 
@@ -111,7 +121,11 @@ fn names_that_are_not_utf8_are_refused() {
         let mut command = steradian(folder.path(), arguments[0]);
         let output = command.arg(OsStr::from_bytes(b"a\xff.json")).output().unwrap();
         assert_eq!(output.status.code(), Some(2), "{}", stderr_of(&output));
-        assert!(stderr_of(&output).contains("is not UTF-8") && stderr_of(&output).lines().count() == 1, "{}", stderr_of(&output));
+        assert!(
+            stderr_of(&output).contains("is not UTF-8") && stderr_of(&output).lines().count() == 1,
+            "{}",
+            stderr_of(&output)
+        );
     }
 }
 
@@ -130,7 +144,11 @@ fn only_files_of_their_kind_are_copied() {
     for library in ["secret", "a.mtl", "/etc/passwd"] {
         std::fs::write(at("m.obj"), obj(library)).unwrap();
         let output = convert(json!({ "type": "mesh", "file": "m.obj" }));
-        assert!(output.status.code() == Some(3) && stderr_of(&output).contains("is not copied"), "{library}: {}", stderr_of(&output));
+        assert!(
+            output.status.code() == Some(3) && stderr_of(&output).contains("is not copied"),
+            "{library}: {}",
+            stderr_of(&output)
+        );
     }
     let output = convert(json!({ "type": "mesh", "file": "secret" }));
     assert_eq!(output.status.code(), Some(3), "{}", stderr_of(&output));

@@ -23,14 +23,19 @@ fn card_before_a_wall(card: Value) -> Value {
     let mut scene = json!({
         "film": { "width": 33, "height": 33, "filter": { "type": "box" } },
         // The wall's piece from -2.5 to 2.5.
-        "camera": { "position": [0, 0, 9], "look_at": [0, 0, 0], "vertical_fov_degrees": 2.0 * (2.5f64 / 9.0).atan().to_degrees() },
+        "camera": {
+            "position": [0, 0, 9], "look_at": [0, 0, 0],
+            "vertical_fov_degrees": 2.0 * (2.5f64 / 9.0).atan().to_degrees()
+        },
         "sampler": { "spp": 4 },
         "integrator": { "type": "path", "max_depth": 2 },
         "textures": {
             "leaf": { "type": "image", "file": "leaf.png", "filter": "nearest" },
             "mask": { "type": "image", "file": "mask.png", "filter": "nearest" }
         },
-        "materials": { "leaf": { "type": "diffuse", "albedo": { "texture": "leaf" } }, "wall": { "type": "diffuse", "albedo": 0.5 } },
+        "materials": {
+            "leaf": { "type": "diffuse", "albedo": { "texture": "leaf" } }, "wall": { "type": "diffuse", "albedo": 0.5 }
+        },
         "shapes": [{ "type": "quad", "material": "wall", "transform": [{ "scale": 4 }] }],
         "lights": [{ "type": "directional", "direction": [-1, 0, -1], "irradiance": [3, 3, 3] }]
     });
@@ -64,7 +69,8 @@ fn a_leaf_card_is_seen_and_casts_a_shadow_only_where_the_leaf_is() {
     let folder = Folder::new();
     save_leaf(&folder);
     let mesh = json!({
-        "type": "mesh", "material": "leaf", "opacity": { "texture": "leaf" }, "positions": [[-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]],
+        "type": "mesh", "material": "leaf", "opacity": { "texture": "leaf" },
+        "positions": [[-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]],
         "triangles": [[0, 1, 2], [0, 2, 3]], "uvs": [[0, 0], [1, 0], [1, 1], [0, 1]]
     });
     let mut instanced = card_before_a_wall(json!({ "type": "disk" }));
@@ -96,7 +102,8 @@ fn a_threshold_makes_all_or_nothing_of_an_opacity_for_every_accelerator() {
     ImageBuffer::from_fn(4, 1, |x, _| Luma([51 * (x as u8 + 1)])).save(folder.path("steps.png")).unwrap();
     let solid = |opacity: Value, filter: &str| -> Vec<bool> {
         let mut scene = card_before_a_wall(quad(opacity));
-        scene["textures"] = json!({ "steps": { "type": "image", "file": "steps.png", "filter": filter, "wrap": "clamp" } });
+        scene["textures"] =
+            json!({ "steps": { "type": "image", "file": "steps.png", "filter": filter, "wrap": "clamp" } });
         scene["materials"]["leaf"]["albedo"] = json!(0.5);
         let scene = folder.compile(&scene).unwrap();
         let mut found: Option<Vec<bool>> = None;
@@ -119,7 +126,10 @@ fn a_threshold_makes_all_or_nothing_of_an_opacity_for_every_accelerator() {
     // a texel before.
     for (threshold, first) in [(0.5, 100), (0.45, 88)] {
         let found = solid(part(threshold), "bilinear");
-        assert!(found.iter().enumerate().all(|(i, hit)| *hit == (i >= first) || i.abs_diff(first) <= 1), "{threshold}: {found:?}");
+        assert!(
+            found.iter().enumerate().all(|(i, hit)| *hit == (i >= first) || i.abs_diff(first) <= 1),
+            "{threshold}: {found:?}"
+        );
     }
     let veil = count(&solid(json!({ "texture": "steps" }), "nearest"));
     assert!((60..140).contains(&veil), "{veil}");
@@ -146,7 +156,8 @@ fn a_number_is_the_part_of_the_light_that_a_surface_stops() {
 fn an_mtl_cuts_leaves_out() {
     let folder = Folder::new();
     save_leaf(&folder);
-    let card = "mtllib m.mtl\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n";
+    let card = "mtllib m.mtl\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\n\
+                f 1/1 2/2 3/3 4/4\n";
     folder.write("m.obj", card);
     let (whole, leaf, nothing) = ([1, 1], [0, 1], [0, 0]);
     for (mtl, opacity, expected) in [
@@ -196,20 +207,30 @@ fn light_comes_from_what_is_there_of_a_shape_with_holes() {
         "dim": { "type": "checker", "color0": [0.4, 0.4, 0.4], "color1": [0.6, 0.6, 0.6], "scale": [1, 0] } });
     let f = FRAC_1_SQRT_2 * FRAC_1_SQRT_2.atan() / PI;
     let half = json!({ "texture": "half" });
-    let quad = json!({ "type": "quad", "origin": [-1, 1, -1], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2], "opacity": half });
-    let veil = json!({ "type": "quad", "origin": [-1, 1, -1], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2], "opacity": 0.5 });
+    let quad =
+        json!({ "type": "quad", "origin": [-1, 1, -1], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2], "opacity": half });
+    let veil =
+        json!({ "type": "quad", "origin": [-1, 1, -1], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2], "opacity": 0.5 });
     let mesh = json!({
-        "type": "mesh", "positions": [[-1, 1, -1], [1, 1, -1], [1, 1, 1], [-1, 1, 1]], "triangles": [[0, 1, 2], [0, 2, 3]],
+        "type": "mesh", "positions": [[-1, 1, -1], [1, 1, -1], [1, 1, 1], [-1, 1, 1]],
+        "triangles": [[0, 1, 2], [0, 2, 3]],
         "uvs": [[0, 0], [1, 0], [1, 1], [0, 1]], "opacity": half
     });
     let mut cut = quad.clone();
     cut["opacity"] = json!({ "texture": "dim", "threshold": 0.5 });
     let sphere = json!({ "type": "sphere", "radius": 0.5, "opacity": 0.5, "transform": [{ "translate": [0, 1, 0] }] });
-    for (shape, two_sided, expected) in
-        [(quad, false, 2.0 * f), (cut, false, 2.0 * f), (veil, false, 2.0 * f), (mesh, false, 2.0 * f), (sphere, true, 0.75 * 0.25)]
-    {
+    for (shape, two_sided, expected) in [
+        (quad, false, 2.0 * f),
+        (cut, false, 2.0 * f),
+        (veil, false, 2.0 * f),
+        (mesh, false, 2.0 * f),
+        (sphere, true, 0.75 * 0.25),
+    ] {
         let mut light = shape.clone();
-        merge(&mut light, json!({ "material": "black", "emission": { "radiance": [1, 1, 1], "two_sided": two_sided } }));
+        merge(
+            &mut light,
+            json!({ "material": "black", "emission": { "radiance": [1, 1, 1], "two_sided": two_sided } }),
+        );
         let mut scene = floor_probe([0.0; 3], json!([light]));
         scene["textures"] = textures.clone();
         assert_irradiance(&scene, f64::from(PI * expected), &shape.to_string());

@@ -35,7 +35,8 @@ fn answers_equal_the_oracles_bit_for_bit() {
         let accels = own(geometry);
         let [camera, bounce, shadow] = path_rays(geometry, &mut rng, COUNT);
         let anyhow = test_rays(&mut rng, geometry, 4 * COUNT);
-        let hits: usize = [camera, bounce, shadow, anyhow].iter().map(|rays| assert_equal(name, geometry, &accels, rays)).sum();
+        let hits: usize =
+            [camera, bounce, shadow, anyhow].iter().map(|rays| assert_equal(name, geometry, &accels, rays)).sum();
         assert!(hits > COUNT / 50 || geometry.shapes.is_empty(), "{name}: {hits}");
     }
 }
@@ -45,7 +46,8 @@ fn agree_on_renders(count: usize) {
     for name in ["cornell", "glass", "gallery", "knot", "motion", "textures"] {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).with_extension("json");
         let desc = import::load_scene(&file).unwrap();
-        let settings = Settings::new(&desc, &Overrides { default_outputs: vec!["a.exr".into()], ..Overrides::default() }).unwrap();
+        let settings =
+            Settings::new(&desc, &Overrides { default_outputs: vec!["a.exr".into()], ..Overrides::default() }).unwrap();
         let scene = compile::compile(&desc, &file).unwrap();
         let geometry = &scene.geometry;
         let (accels, embree) = (own(geometry), build(AccelKind::EMBREE, geometry, 2).unwrap());
@@ -66,7 +68,12 @@ fn agree_on_renders(count: usize) {
                 }
             }
             // An edge seen from the side, met by one and not by the other.
-            assert!(different * 20_000 <= set.rays.len() + 20_000, "{name}, {:?}: {different} of {}", set.kind, set.rays.len());
+            assert!(
+                different * 20_000 <= set.rays.len() + 20_000,
+                "{name}, {:?}: {different} of {}",
+                set.kind,
+                set.rays.len()
+            );
         }
     }
 }
@@ -172,9 +179,17 @@ fn a_ray_visits_few_nodes_and_primitives() {
         let [camera, bounce, _] = path_rays(&alone, &mut Rng::new(37), 4_000);
         let geometry = meshes(shapes);
         println!("{name}, camera");
-        visits(&geometry, &camera, &[("bvh", 15.0), ("bvh:binary", 64.0), ("kdtree", 64.0), ("kdtree:median", 160.0), ("octree", 64.0)]);
+        visits(
+            &geometry,
+            &camera,
+            &[("bvh", 15.0), ("bvh:binary", 64.0), ("kdtree", 64.0), ("kdtree:median", 160.0), ("octree", 64.0)],
+        );
         println!("{name}, bounce");
-        visits(&geometry, &bounce, &[("bvh", 40.0), ("bvh:binary", 128.0), ("kdtree", 128.0), ("kdtree:median", 320.0), ("octree", 96.0)]);
+        visits(
+            &geometry,
+            &bounce,
+            &[("bvh", 40.0), ("bvh:binary", 128.0), ("kdtree", 128.0), ("kdtree:median", 320.0), ("octree", 96.0)],
+        );
     }
 }
 
@@ -199,7 +214,9 @@ fn garbage_ends_in_bounded_trees() {
         ),
         (
             "all long",
-            positions(5_000, &mut |i| [DVec3::new(-1.0, 0.001 * i as f64, 0.0), DVec3::new(1.0, 0.001 * i as f64, 0.1), angle(i)]),
+            positions(5_000, &mut |i| {
+                [DVec3::new(-1.0, 0.001 * i as f64, 0.0), DVec3::new(1.0, 0.001 * i as f64, 0.1), angle(i)]
+            }),
         ),
         ("shrinking", positions(5_000, &mut |i| one.map(|p| (p + DVec3::ONE) * 0.5f64.powi(i as i32 % 120)))),
         (
@@ -217,13 +234,20 @@ fn garbage_ends_in_bounded_trees() {
         for (accel_name, accel) in own(&geometry) {
             let stats = StructureStats::of(accel.inspect().unwrap());
             assert!(stats.max_depth <= 65, "{name}, {accel_name}: {stats:?}");
-            assert!(accel.memory_bytes() <= 400 * count + 4096, "{name}, {accel_name}: {} bytes for {count}", accel.memory_bytes());
+            assert!(
+                accel.memory_bytes() <= 400 * count + 4096,
+                "{name}, {accel_name}: {} bytes for {count}",
+                accel.memory_bytes()
+            );
             assert!(stats.references <= 32 * count as u64 + 1024, "{name}, {accel_name}: {stats:?}");
             let rays = [ray(DVec3::new(0.2, 0.2, -3.0), DVec3::Z), ray(DVec3::new(-3.0, 0.3, 0.05), DVec3::X)];
             if name == "shrinking" || name == "huge and tiny" {
                 // From 2^50 times its size away a triangle is a point even in f64, and may be hit falsely where no box
                 // lets it be tested.
-                assert!(rays.iter().all(|ray| accel.occluded(ray) == accel.intersect(ray).is_some()), "{name}, {accel_name}");
+                assert!(
+                    rays.iter().all(|ray| accel.occluded(ray) == accel.intersect(ray).is_some()),
+                    "{name}, {accel_name}"
+                );
             } else {
                 assert_equal(name, &geometry, &[(accel_name, accel)], &rays);
             }
@@ -235,8 +259,10 @@ fn garbage_ends_in_bounded_trees() {
 #[test]
 fn a_hit_does_not_depend_on_the_order_of_tests() {
     let long: Vec<_> = (0..200).map(|i| 0.01 * f64::from(i)).collect();
-    let corners: Vec<DVec3> =
-        long.iter().flat_map(|z| [DVec3::new(-9.0, -9.0, *z), DVec3::new(9.0, -9.0, *z), DVec3::new(0.0, 9.0, *z)]).collect();
+    let corners: Vec<DVec3> = long
+        .iter()
+        .flat_map(|z| [DVec3::new(-9.0, -9.0, *z), DVec3::new(9.0, -9.0, *z), DVec3::new(0.0, 9.0, *z)])
+        .collect();
     let geometry = meshes(vec![mesh(&corners, (0..200).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect())]);
     let mut rng = Rng::new(39);
     let rays: Vec<Ray> = (0..2_000).map(|_| ray_through(4.0 * rng.direction(), rng.cube())).collect();

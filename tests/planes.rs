@@ -36,8 +36,15 @@ fn a_plane_is_met_up_to_the_horizon_by_every_accelerator() {
             let direction = ray.direction.as_dvec3();
             let expected = DVec3::Y - direction / direction.y;
             let distance = expected.length();
-            assert!((at.p - expected).length() < 1e-9 * distance && at.p.y.abs() < 1e-10, "{name} {i}: {} {expected}", at.p);
-            assert!((f64::from(hit.t) - -1.0 / direction.y).abs() < 1e-6 * distance && at.n_g == DVec3::Y.as_vec3(), "{name}: {hit:?}");
+            assert!(
+                (at.p - expected).length() < 1e-9 * distance && at.p.y.abs() < 1e-10,
+                "{name} {i}: {} {expected}",
+                at.p
+            );
+            assert!(
+                (f64::from(hit.t) - -1.0 / direction.y).abs() < 1e-6 * distance && at.n_g == DVec3::Y.as_vec3(),
+                "{name}: {hit:?}"
+            );
             // u is +x cross +y, v +y cross u, in units of length.
             let uv = [expected.z, expected.x];
             assert!((0..2).all(|k| (f64::from(at.uv[k]) - uv[k]).abs() < 1e-6 * distance), "{name}: {at:?}");
@@ -71,7 +78,9 @@ fn a_plane_reflects_what_falls_on_it() {
     // The same plane by another point and normal, under a transform that turns its back to the camera.
     scene["shapes"][0] = json!({
         "type": "plane", "material": "grey", "point": [7, -3, 4], "normal": [0, 0, 3],
-        "transform": [{ "translate": [0, 0, -4] }, { "rotate": { "axis": [1, 0, 0], "degrees": 90 } }, { "scale": [3, 0.5, 2] }]
+        "transform": [
+            { "translate": [0, 0, -4] }, { "rotate": { "axis": [1, 0, 0], "degrees": 90 } }, { "scale": [3, 0.5, 2] }
+        ]
     });
     Estimate::of(&render(&scene), 1).assert_is(expected, "placed");
 }

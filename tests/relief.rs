@@ -52,7 +52,8 @@ fn save_normal(folder: &Folder, n: [f32; 3]) {
 
 fn square(uvs: Value) -> Value {
     json!({
-        "type": "mesh", "material": "m", "positions": [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], "triangles": [[0, 1, 2], [0, 2, 3]],
+        "type": "mesh", "material": "m", "positions": [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]],
+        "triangles": [[0, 1, 2], [0, 2, 3]],
         "uvs": uvs
     })
 }
@@ -69,7 +70,9 @@ fn shapes() -> Vec<Value> {
             "type": "cylinder", "material": "m", "height": 2,
             "transform": [{ "translate": [0, 0, -1] }, { "rotate": { "axis": [0, 1, 0], "degrees": 70 } }]
         }),
-        json!({ "type": "revolution", "material": "m", "profile": { "bezier": [[0.5, -1], [1.5, -1], [1.5, 1], [0.5, 1]] } }),
+        json!({
+            "type": "revolution", "material": "m", "profile": { "bezier": [[0.5, -1], [1.5, -1], [1.5, 1], [0.5, 1]] }
+        }),
         json!({ "type": "cube", "material": "m" }),
         square(json!([[0, 0], [1, 0], [1, 1], [0, 1]])),
         square(json!([[1, 0], [0, 0], [0, 1], [1, 1]])),
@@ -104,13 +107,21 @@ fn normal_maps_tilt_along_u_and_v_of_every_shape_wherever_it_stands() {
                         scene["shapes"] = json!([shape]);
                     }
                     let compiled = folder.compile(&scene).unwrap();
-                    let (at, dp_dv) = meet(&compiled, &Ray::new(vec3(0.31, 0.17, 5.0), -Vec3::Z)).unwrap_or_else(|| panic!("{scene}"));
+                    let (at, dp_dv) = meet(&compiled, &Ray::new(vec3(0.31, 0.17, 5.0), -Vec3::Z))
+                        .unwrap_or_else(|| panic!("{scene}"));
                     // The part of the derivative across the other one: what grows u without changing v, seen in the
                     // surface.
                     let (t, b) = (at.dp_du - at.n_g * at.n_g.dot(at.dp_du), dp_dv - at.n_g * at.n_g.dot(dp_dv));
-                    let expected = if along_v { at.n_g.cross(t).normalize() * at.n_g.cross(t).dot(b).signum() } else { t.normalize() };
+                    let expected = if along_v {
+                        at.n_g.cross(t).normalize() * at.n_g.cross(t).dot(b).signum()
+                    } else {
+                        t.normalize()
+                    };
                     let cos = at.n_s.dot(expected);
-                    assert!((cos - tilt).abs() < 2e-4 && (at.n_s.dot(at.n_g) - 0.8).abs() < 2e-4, "{shape} {transform}: {at:?}");
+                    assert!(
+                        (cos - tilt).abs() < 2e-4 && (at.n_s.dot(at.n_g) - 0.8).abs() < 2e-4,
+                        "{shape} {transform}: {at:?}"
+                    );
                     assert!((at.n_s.length() - 1.0).abs() < 1e-5);
                 }
             }
@@ -158,7 +169,8 @@ fn bump_maps_have_the_slopes_of_their_heights() {
     for (height, filter) in [(0.5, "bilinear"), (-0.25, "bilinear")] {
         for (size, instanced) in [([2.0, 2.0, 0.0], false), ([5.0, 1.0, 0.0], true)] {
             let shape = json!({
-                "type": "quad", "material": "m", "origin": [-0.5 * size[0], -0.5 * size[1], 0.0], "edge_u": [size[0], 0, 0], "edge_v": [0, size[1], 0]
+                "type": "quad", "material": "m", "origin": [-0.5 * size[0], -0.5 * size[1], 0.0],
+                "edge_u": [size[0], 0, 0], "edge_v": [0, size[1], 0]
             });
             let mut scene = scene_of(json!([]), json!({ "bump_map": { "texture": "map", "height": height } }));
             scene["textures"]["map"]["filter"] = json!(filter);
@@ -188,12 +200,17 @@ fn no_light_leaks_into_a_closed_box_whatever_its_normals_say() {
         Rgb(n.to_array().map(|x| (x * 127.5 + 127.5) as u8))
     });
     wild.save(folder.path("map.png")).unwrap();
-    for material in
-        [json!({ "type": "diffuse", "albedo": 0.9 }), json!({ "type": "mirror" }), json!({ "type": "plastic", "roughness": 0.4 })]
-    {
+    for material in [
+        json!({ "type": "diffuse", "albedo": 0.9 }),
+        json!({ "type": "mirror" }),
+        json!({ "type": "plastic", "roughness": 0.4 }),
+    ] {
         for integrator in ["path", "whitted"] {
             let mut scene = scene_of(
-                json!([{ "type": "cube", "material": "m", "transform": [{ "scale": 3 }] }, { "type": "sphere", "material": "m" }]),
+                json!([
+                    { "type": "cube", "material": "m", "transform": [{ "scale": 3 }] },
+                    { "type": "sphere", "material": "m" }
+                ]),
                 normal_map(),
             );
             scene["materials"]["plain"] = material.clone();
@@ -260,7 +277,10 @@ fn ball(n: u32, shading: &str) -> Value {
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());
     for j in 0..=n {
         for i in 0..=2 * n {
-            let (theta, phi) = (std::f64::consts::PI * f64::from(j) / f64::from(n), std::f64::consts::PI * f64::from(i) / f64::from(n));
+            let (theta, phi) = (
+                std::f64::consts::PI * f64::from(j) / f64::from(n),
+                std::f64::consts::PI * f64::from(i) / f64::from(n),
+            );
             positions.push([theta.sin() * phi.cos(), theta.cos(), -theta.sin() * phi.sin()]);
         }
     }
@@ -271,7 +291,10 @@ fn ball(n: u32, shading: &str) -> Value {
             triangles.push([index(i, j), index(i + 1, j + 1), index(i + 1, j)]);
         }
     }
-    json!({ "type": "mesh", "material": "plain", "positions": positions, "normals": positions, "triangles": triangles, "shading": shading })
+    json!({
+        "type": "mesh", "material": "plain", "positions": positions, "normals": positions, "triangles": triangles,
+        "shading": shading
+    })
 }
 
 fn lit(shape: Value) -> Value {
@@ -313,7 +336,10 @@ fn a_coarse_smooth_ball_is_shaded_like_a_round_one() {
     // compared.
     let mean = |image: &steradian::film::Image| {
         let inside = |x: u32, y: u32| (x as f32 + 0.5 - 48.0).hypot(y as f32 + 0.5 - 48.0) < 45.0;
-        let values = (0..96 * 96).map(|i| (i % 96, i / 96)).filter(|&(x, y)| inside(x, y)).map(|(x, y)| image.rgb(x, y).unwrap()[1]);
+        let values = (0..96 * 96)
+            .map(|i| (i % 96, i / 96))
+            .filter(|&(x, y)| inside(x, y))
+            .map(|(x, y)| image.rgb(x, y).unwrap()[1]);
         values.map(f64::from).sum::<f64>()
     };
     let ratio = mean(&smooth) / mean(&round);
@@ -339,8 +365,13 @@ fn creases_are_edges_and_what_is_flatter_is_smooth() {
     let folder = Folder::new();
     let cube = json!({
         "type": "mesh", "material": "plain", "shading": "smooth",
-        "positions": [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]],
-        "triangles": [[4, 5, 6], [4, 6, 7], [1, 0, 3], [1, 3, 2], [5, 1, 2], [5, 2, 6], [0, 4, 7], [0, 7, 3], [7, 6, 2], [7, 2, 3], [0, 1, 5], [0, 5, 4]]
+        "positions": [
+            [-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]
+        ],
+        "triangles": [
+            [4, 5, 6], [4, 6, 7], [1, 0, 3], [1, 3, 2], [5, 1, 2], [5, 2, 6], [0, 4, 7], [0, 7, 3], [7, 6, 2],
+            [7, 2, 3], [0, 1, 5], [0, 5, 4]
+        ]
     });
     let normal = |shape: &Value| {
         let mut scene = scene_of(json!([shape]), json!({}));

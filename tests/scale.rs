@@ -16,7 +16,8 @@ fn scene(s: f64, offset: [f64; 3]) -> Value {
     json!({
         "film": { "width": 16, "height": 16, "filter": { "type": "box" } },
         "camera": {
-            "position": at([0.25, 1.5, 4.0]), "look_at": at([0.0, 0.5, 0.0]), "vertical_fov_degrees": 40, "near": 0.125 * s,
+            "position": at([0.25, 1.5, 4.0]), "look_at": at([0.0, 0.5, 0.0]), "vertical_fov_degrees": 40,
+            "near": 0.125 * s,
             "lens": { "radius": 0.03125 * s, "focus_distance": 4.0 * s }
         },
         "sampler": { "type": "independent", "spp": 16, "seed": 5 },
@@ -24,23 +25,43 @@ fn scene(s: f64, offset: [f64; 3]) -> Value {
         "materials": {
             "grey": { "type": "diffuse", "albedo": 0.5 },
             "rough": { "type": "relief", "material": "grey", "bump_map": { "texture": "bumps", "height": 0.0625 * s } },
-            "tea": { "type": "dielectric", "ior": 1.5, "absorption": { "color": [0.25, 0.5, 0.75], "distance": 0.5 * s } }
+            "tea": {
+                "type": "dielectric", "ior": 1.5, "absorption": { "color": [0.25, 0.5, 0.75], "distance": 0.5 * s }
+            }
         },
         "shapes": [
-            { "type": "quad", "material": "rough", "origin": at([-4.0, 0.0, 4.0]), "edge_u": along([8.0, 0.0, 0.0]), "edge_v": along([0.0, 0.0, -8.0]) },
-            { "type": "sphere", "material": "tea", "radius": 0.5 * s, "transform": [{ "translate": at([-0.75, 0.5, 0.25]) }] },
-            { "type": "mesh", "material": "grey", "triangles": [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
-              "positions": [at([-1.5, 0.0625, -0.75]), at([-1.0, 0.0625, -0.5]), at([-1.25, 0.0625, -1.5]), at([-1.25, 1.0, -1.0])] },
+            {
+                "type": "quad", "material": "rough", "origin": at([-4.0, 0.0, 4.0]), "edge_u": along([8.0, 0.0, 0.0]),
+                "edge_v": along([0.0, 0.0, -8.0])
+            },
+            {
+                "type": "sphere", "material": "tea", "radius": 0.5 * s,
+                "transform": [{ "translate": at([-0.75, 0.5, 0.25]) }]
+            },
+            {
+                "type": "mesh", "material": "grey", "triangles": [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
+                "positions": [
+                    at([-1.5, 0.0625, -0.75]), at([-1.0, 0.0625, -0.5]), at([-1.25, 0.0625, -1.5]),
+                    at([-1.25, 1.0, -1.0])
+                ]
+            },
             { "type": "disk", "radius": 0.5 * s, "emission": { "radiance": [9, 8, 7] },
               "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": 90 } }, { "translate": at([0.0, 2.5, 0.0]) }] }
         ],
         "objects": { "block": { "shapes": [{ "type": "cube", "material": "grey" }] } },
-        "instances": [{ "object": "block", "transform": [{ "scale": 0.375 * s }, { "translate": at([0.75, 0.375, 0.5]) }],
-                        "motion": [{ "time": 0, "transform": [] }, { "time": 1, "transform": [{ "translate": along([0.125, 0.0, 0.0]) }] }] }],
+        "instances": [{
+            "object": "block", "transform": [{ "scale": 0.375 * s }, { "translate": at([0.75, 0.375, 0.5]) }],
+            "motion": [
+                { "time": 0, "transform": [] }, { "time": 1, "transform": [{ "translate": along([0.125, 0.0, 0.0]) }] }
+            ]
+        }],
         "lights": [
             { "type": "environment", "radiance": [0.25, 0.25, 0.5] },
             { "type": "point", "position": at([-1.5, 1.5, 1.5]), "intensity": [1.5 * s * s, 1.5 * s * s, 1.5 * s * s] },
-            { "type": "spot", "position": at([1.5, 2.0, 1.5]), "look_at": at([0.0, 0.0, 0.0]), "intensity": [s * s, s * s, s * s] }
+            {
+                "type": "spot", "position": at([1.5, 2.0, 1.5]), "look_at": at([0.0, 0.0, 0.0]),
+                "intensity": [s * s, s * s, s * s]
+            }
         ],
         "outputs": [{ "file": "a.exr", "layers": ["Z", "P"] }]
     })
@@ -123,14 +144,16 @@ fn meshes_with_map_coordinates_keep_their_digits() {
     let far = near.map(|p| [0, 1, 2].map(|k| offset[k] + p[k]));
     assert_eq!(picture(json!({ "positions": far, "triangles": faces }), offset), expected);
 
-    let lines =
-        |prefix: &str, rows: &[[f64; 3]]| -> String { rows.iter().map(|[x, y, z]| format!("{prefix}{x:?} {y:?} {z:?}\n")).collect() };
+    let lines = |prefix: &str, rows: &[[f64; 3]]| -> String {
+        rows.iter().map(|[x, y, z]| format!("{prefix}{x:?} {y:?} {z:?}\n")).collect()
+    };
     let obj_faces: String = faces.iter().map(|[a, b, c]| format!("f {} {} {}\n", a + 1, b + 1, c + 1)).collect();
     folder.write("m.obj", format!("{}{obj_faces}", lines("v ", &far)));
     assert_eq!(picture(json!({ "file": "m.obj" }), offset), expected);
 
     let ply_faces: String = faces.iter().map(|[a, b, c]| format!("3 {a} {b} {c}\n")).collect();
-    let header = "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\nelement face 4\n\
+    let header = "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\n\
+                  element face 4\n\
                   property list uchar int vertex_indices\nend_header\n";
     folder.write("m.ply", format!("{header}{}{ply_faces}", lines("", &far)));
     assert_eq!(picture(json!({ "file": "m.ply" }), offset), expected);
@@ -183,8 +206,10 @@ fn coincident_faces_of_an_emitter_are_one() {
             "film": { "width": 12, "height": 12, "filter": { "type": "box" } },
             "sampler": { "type": "independent", "spp": 2, "seed": 1 },
             "camera": { "position": [0.25, 0.25, 4], "look_at": [0.25, 0.25, 0], "vertical_fov_degrees": 20 },
-            "shapes": [{ "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 1, 0]], "triangles": triangles,
-                         "emission": { "radiance": [1, 2, 3] } }]
+            "shapes": [{
+                "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 1, 0]], "triangles": triangles,
+                "emission": { "radiance": [1, 2, 3] }
+            }]
         }))
     };
     let front = picture(json!([[0, 1, 2]]));
@@ -198,7 +223,12 @@ fn coincident_faces_of_an_emitter_are_one() {
 #[test]
 fn coincident_faces_that_differ_are_one_warning() {
     let folder = tempfile::tempdir().unwrap();
-    let face = |triangle: [usize; 3], material: &str| json!({ "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [triangle], "material": material });
+    let face = |triangle: [usize; 3], material: &str| {
+        json!({
+            "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [triangle],
+            "material": material
+        })
+    };
     let instanced = |x: f64| json!({ "object": "o", "transform": [{ "translate": [x, 0, 0] }] });
     let warnings = |shapes: Vec<Value>, object: Vec<Value>| {
         let scene = json!({
@@ -228,7 +258,10 @@ fn coincident_faces_that_differ_are_one_warning() {
     ] {
         let lines = two(first.clone(), second.clone());
         assert_eq!(lines.len(), usize::from(warned), "{first} {second}: {lines:?}");
-        for part in lines.iter().flat_map(|line| ["shapes[1]: 1 triangle coincides", "shapes[2]", "remove one"].map(|part| (line, part))) {
+        for part in lines
+            .iter()
+            .flat_map(|line| ["shapes[1]: 1 triangle coincides", "shapes[2]", "remove one"].map(|part| (line, part)))
+        {
             assert!(part.0.contains(part.1), "{part:?}");
         }
         // Of an object that is placed twice, once; and with none of another object or of the world.
@@ -240,12 +273,18 @@ fn coincident_faces_that_differ_are_one_warning() {
     assert!(two(face([0, 1, 2], "red"), apart).is_empty());
     let sides = |emission: Value| {
         json!({ "type": "mesh", "triangles": [[6, 2, 1], [0, 2, 6]], "emission": emission,
-                "positions": [[-0.688, 0.6156, 0.7457], [-0.688, 0.6156, 0.7457], [-0.5833, -0.9415, -0.8049], [-0.8036, -0.7218, -0.0448],
-                              [0.5423, 0.1878, -0.2835], [0.9112, -0.5908, 0.243], [-0.6787, -0.1173, 0.0922]],
+                "positions": [
+                    [-0.688, 0.6156, 0.7457], [-0.688, 0.6156, 0.7457], [-0.5833, -0.9415, -0.8049],
+                    [-0.8036, -0.7218, -0.0448], [0.5423, 0.1878, -0.2835], [0.9112, -0.5908, 0.243],
+                    [-0.6787, -0.1173, 0.0922]
+                ],
                 "transform": [{ "rotate": { "axis": [-0.1016, -0.0028, 0.2143], "degrees": 236.0464 } }] })
     };
     let within = warnings(vec![sides(Value::Null)], vec![elsewhere.clone()]);
-    assert!(within.len() == 1 && within[0].contains("shapes[0]: 1 triangle") && within[0].contains("of the same mesh"), "{within:?}");
+    assert!(
+        within.len() == 1 && within[0].contains("shapes[0]: 1 triangle") && within[0].contains("of the same mesh"),
+        "{within:?}"
+    );
     // Those of emitters are dropped already.
     assert!(warnings(vec![sides(json!({ "radiance": [11, 11, 11] }))], vec![elsewhere.clone()]).is_empty());
 }

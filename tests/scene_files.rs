@@ -79,7 +79,8 @@ fn a_scene_survives_writing() {
 
 #[test]
 fn comments_are_allowed_everywhere_but_in_strings() {
-    let text = good_scene().to_string().replace("{\"", "/* \" */{ // }\n\"").replace("\"out.exr\"", "\"a//b/*c*/.exr\"");
+    let text =
+        good_scene().to_string().replace("{\"", "/* \" */{ // }\n\"").replace("\"out.exr\"", "\"a//b/*c*/.exr\"");
     let path = Folder::new().write("scene.json", &text);
     let scene = import::parse_scene(&text, &path).unwrap();
     assert_eq!(scene.outputs[0].file, "a//b/*c*/.exr");
@@ -105,7 +106,8 @@ fn fronts_stay_fronts_in_a_mirror_and_turn_on_demand() {
     let folder = Folder::new();
     for (scale, reverse, front) in [(1.0, false, 1.0), (-1.0, false, 1.0), (1.0, true, -1.0), (-1.0, true, -1.0)] {
         let triangle = json!({
-            "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]], "normals": vec![[0.6, 0.0, 0.8]; 3],
+            "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]],
+            "normals": vec![[0.6, 0.0, 0.8]; 3],
             "transform": [{ "scale": [scale, 1.0, 2.0] }], "reverse_normal": reverse
         });
         let scene = folder.compile(&lit(triangle)).unwrap();
@@ -128,8 +130,9 @@ fn triangles_without_area_are_dropped() {
 fn shading_chooses_the_normals() {
     let folder = Folder::new();
     let has_normals = |normals: bool, shading: Value| {
-        let mut triangle =
-            json!({ "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]], "shading": shading });
+        let mut triangle = json!({
+            "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]], "shading": shading
+        });
         if normals {
             triangle["normals"] = json!(vec![[0.0, 0.0, 1.0]; 3]);
         }
@@ -183,7 +186,8 @@ fn pyramid_ply(format: &str, number: impl Fn(f32) -> Vec<u8>, index: impl Fn(u32
 fn pyramid_obj() -> String {
     let vertices = PYRAMID.iter().map(|[x, y, z, u, v]| format!("v {x} {y} {z}\nvt {u} {v}\n")).collect::<String>();
     let corner = |i: &u32| format!(" {0}/{0}", i + 1);
-    vertices + &FACES.iter().map(|face| format!("f{}\n", face.iter().map(corner).collect::<String>())).collect::<String>()
+    vertices
+        + &FACES.iter().map(|face| format!("f{}\n", face.iter().map(corner).collect::<String>())).collect::<String>()
 }
 
 #[test]
@@ -210,7 +214,10 @@ fn the_same_mesh_in_every_format_is_the_same() {
 fn an_obj_has_its_materials_and_lights_unless_one_is_given() {
     let folder = Folder::new();
     folder.write("m.mtl", "newmtl wall\nKd 0.2 0.4 0.6\nnewmtl lamp\nKd 0 0 0\nKe 3 2 1\n");
-    folder.write("m.obj", format!("mtllib m.mtl\n{}usemtl lamp\nf 1 2 3\nusemtl wall\nf 1 3 4\ng more\nf 2 3 5\n", pyramid_obj()));
+    folder.write(
+        "m.obj",
+        format!("mtllib m.mtl\n{}usemtl lamp\nf 1 2 3\nusemtl wall\nf 1 3 4\ng more\nf 2 3 5\n", pyramid_obj()),
+    );
     let own = folder.compile(&lit(json!({ "type": "mesh", "file": "m.obj" }))).unwrap();
     // Without a material, with the lamp's, with the wall's.
     assert_eq!(own.geometry.shapes.len(), 3);
@@ -228,7 +235,8 @@ fn an_obj_has_its_materials_and_lights_unless_one_is_given() {
 fn maps_of_an_mtl_colour_mirrors_metals_and_lamps() {
     let folder = Folder::new();
     ImageBuffer::from_fn(2, 1, |x, _| image::Rgb([255 * x as u8; 3])).save(folder.path("map.png")).unwrap();
-    let square = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n";
+    let square =
+        "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n";
     folder.write("m.obj", format!("mtllib m.mtl\n{square}"));
     let compile = |mtl: &str| {
         folder.write("m.mtl", format!("newmtl m\n{mtl}\n"));
@@ -265,9 +273,11 @@ fn maps_of_an_mtl_colour_mirrors_metals_and_lamps() {
 
     let dark = folder.path("dark.exr");
     exr::prelude::write_rgb_file(dark, 1, 1, |_, _| (-1f32, 0f32, 0f32)).unwrap();
-    for (mtl, fault) in
-        [("map_Ke dark.exr", "light is not negative"), ("illum 5\nmap_Ks dark.exr", "from -1 to 0"), ("map_Ke gone.png", "gone.png")]
-    {
+    for (mtl, fault) in [
+        ("map_Ke dark.exr", "light is not negative"),
+        ("illum 5\nmap_Ks dark.exr", "from -1 to 0"),
+        ("map_Ke gone.png", "gone.png"),
+    ] {
         folder.write("m.mtl", format!("newmtl m\n{mtl}\n"));
         let message = folder.compile(&lit(json!({ "type": "mesh", "file": "m.obj" }))).unwrap_err().to_string();
         assert!(message.contains("shapes[0]") && message.contains(fault), "{mtl}: {message}");
@@ -286,10 +296,15 @@ fn what_emits_in_an_object_stands_in_the_world_for_each_instance() {
                 "shapes": [
                     { "type": "cube" },
                     { "type": "mesh", "file": "m.obj" },
-                    { "type": "sphere", "radius": 0.5, "emission": { "radiance": [1, 1, 1] }, "transform": [{ "translate": [1, 0, 0] }] }
+                    {
+                        "type": "sphere", "radius": 0.5, "emission": { "radiance": [1, 1, 1] },
+                        "transform": [{ "translate": [1, 0, 0] }]
+                    }
                 ]
             },
-            "outer": { "instances": [{ "object": "inner" }, { "object": "inner", "transform": [{ "translate": [0, 10, 0] }] }] },
+            "outer": {
+                "instances": [{ "object": "inner" }, { "object": "inner", "transform": [{ "translate": [0, 10, 0] }] }]
+            },
             "idle": { "shapes": [{ "type": "disk" }] }
         },
         "instances": [{ "object": "outer", "transform": [{ "scale": 2 }] }, { "object": "inner" }]
@@ -334,8 +349,16 @@ fn the_summary_counts_what_is_there() {
     assert_eq!(summary["shapes"]["sphere"], 3);
     assert_eq!(summary["textures"], 1);
     let features = summary["features"].as_array().unwrap();
-    for feature in ["lights", "environment", "analytic shapes", "instances", "textures", "mirror or glass", "anisotropic materials", "lens"]
-    {
+    for feature in [
+        "lights",
+        "environment",
+        "analytic shapes",
+        "instances",
+        "textures",
+        "mirror or glass",
+        "anisotropic materials",
+        "lens",
+    ] {
         assert!(features.contains(&json!(feature)), "{feature}");
     }
 }
@@ -348,22 +371,28 @@ fn a_byte_order_mark_changes_nothing() {
     let named = |from: &str| std::fs::read(files.join(from)).unwrap();
     let with = |mark: &str, content: &[u8]| [mark.as_bytes(), content].concat();
     let marks = ["", "\u{feff}"];
-    for (from, name) in
-        [("scene_json/full", "a.json"), ("mitsuba_xml/min", "a.xml"), ("pbrt/box", "a.pbrt"), ("gltf/triangle.gltf", "a.gltf")]
-    {
+    for (from, name) in [
+        ("scene_json/full", "a.json"),
+        ("mitsuba_xml/min", "a.xml"),
+        ("pbrt/box", "a.pbrt"),
+        ("gltf/triangle.gltf", "a.gltf"),
+    ] {
         let [plain, marked] = marks.map(|mark| {
-            let imported = import::read_scene(&folder.write(name, with(mark, &named(from))), &ImportOptions::default()).unwrap();
+            let imported =
+                import::read_scene(&folder.write(name, with(mark, &named(from))), &ImportOptions::default()).unwrap();
             serde_json::to_value(&imported.desc).unwrap()
         });
         assert_eq!(plain, marked, "{name}");
     }
     for from in ["ply/ascii", "ply/big", "ply/little"] {
-        let [plain, marked] = marks.map(|mark| assets::read_ply(&folder.write("a.ply", with(mark, &named(from)))).unwrap());
+        let [plain, marked] =
+            marks.map(|mark| assets::read_ply(&folder.write("a.ply", with(mark, &named(from)))).unwrap());
         assert!(plain == marked && !plain.triangles.is_empty(), "{from}");
     }
     let [plain, marked] = marks.map(|mark| {
         folder.write("a.mtl", format!("{mark}newmtl red\nKd 0.5 0 0\n"));
-        let obj = folder.write("a.obj", format!("{mark}mtllib a.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
+        let obj =
+            folder.write("a.obj", format!("{mark}mtllib a.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
         format!("{:?}", assets::read_obj(&obj, true).unwrap())
     });
     assert!(plain == marked && plain.contains("red"), "{marked}");

@@ -20,7 +20,10 @@ fn a_triangle_of_any_size_is_not_hit_again() {
         for _ in 0..100 {
             let [u, v, w] = rng.barycentric();
             let target = a * u + b * v + c * w;
-            let Some(si) = closest(&accel, &geometry, &ray_through(target + rng.direction() * size, target)).found else { continue };
+            let Some(si) = closest(&accel, &geometry, &ray_through(target + rng.direction() * size, target)).found
+            else {
+                continue;
+            };
             rays += 1;
             again += usize::from(closest(&accel, &geometry, &si.spawn(rng.direction().as_vec3())).found.is_some());
         }

@@ -8,7 +8,8 @@ use steradian::film::{FilmTile, Image, SumPlane};
 use steradian::math::Rng;
 use steradian::render::{self, Overrides, Shard, StateFile};
 
-use crate::checkpoints::{Kit, channels, scene};
+use crate::checkpoints::{Kit, scene};
+use crate::interrupted::channels;
 
 /// Writes shards, and returns their files.
 fn written(kit: &Kit, folder: &Path, shards: impl IntoIterator<Item = Shard>) -> Vec<PathBuf> {
@@ -79,7 +80,10 @@ fn what_is_missing_double_or_foreign_is_named() {
     let copy = folder.path().join("copy.shard");
     std::fs::copy(b, &copy).unwrap();
     let double = refusal(&[a, b, c, d, &copy], true);
-    assert!(double.contains("copy.shard: shard 2/4 is there twice") && double.contains("2-of-4.shard has it too"), "{double}");
+    assert!(
+        double.contains("copy.shard: shard 2/4 is there twice") && double.contains("2-of-4.shard has it too"),
+        "{double}"
+    );
 
     let other = tempfile::tempdir().unwrap();
     let change = |overrides: Overrides, count: u32, expected: &str| {
@@ -179,7 +183,11 @@ fn sums_do_not_depend_on_how_their_terms_are_split() {
             while !parts.is_empty() {
                 merged.merge(&parts.swap_remove(rng.below(parts.len())), 1.0);
             }
-            assert_eq!(merged.values(0)[0].to_bits(), sum(&terms).values(0)[0].to_bits(), "{decades}, {signed}, {cancelling}: {terms:?}");
+            assert_eq!(
+                merged.values(0)[0].to_bits(),
+                sum(&terms).values(0)[0].to_bits(),
+                "{decades}, {signed}, {cancelling}: {terms:?}"
+            );
         }
     }
 }
@@ -202,15 +210,24 @@ fn the_program_splits_and_merges() {
     let folder = folder.path();
     let mut scene = scene("mitchell");
     let layers = ["Z", "N", "albedo", "variance", "samples", "light_groups", "diffuse_direct"];
-    scene["outputs"] =
-        serde_json::json!([{ "file": "x.exr", "layers": layers, "pixel_type": "float" }, { "file": "x.png", "exposure": 1 }]);
+    scene["outputs"] = serde_json::json!([
+        { "file": "x.exr", "layers": layers, "pixel_type": "float" }, { "file": "x.png", "exposure": 1 }
+    ]);
     std::fs::write(folder.join("scene.json"), scene.to_string()).unwrap();
     assert_code(&run(folder, "render scene.json -q"), 0, "");
     for shard in 1..=3 {
-        assert_code(&run(folder, &format!("render scene.json --shard {shard}/3 -q --checkpoint {shard}.state --resume")), 0, "");
+        assert_code(
+            &run(folder, &format!("render scene.json --shard {shard}/3 -q --checkpoint {shard}.state --resume")),
+            0,
+            "",
+        );
     }
     let merge = "merge scene.3-of-3.shard scene.1-of-3.shard scene.2-of-3.shard";
-    assert_code(&run(folder, &format!("{merge} -o m.exr -o m.png")), 0, "24 samples per pixel\nwrote m.exr\nwrote m.png");
+    assert_code(
+        &run(folder, &format!("{merge} -o m.exr -o m.png")),
+        0,
+        "24 samples per pixel\nwrote m.exr\nwrote m.png",
+    );
     let (merged, whole) = (channels(&folder.join("m.exr")), channels(&folder.join("x.exr")));
     assert!(whole.len() > 20 && merged == whole, "{}", whole.len());
     assert!(std::fs::read(folder.join("m.png")).unwrap() == std::fs::read(folder.join("x.png")).unwrap());
@@ -247,7 +264,9 @@ fn with_header(file: &Path, to: &Path, change: impl FnOnce(&mut serde_json::Valu
     let mut header = serde_json::from_slice(&bytes[16..16 + length]).unwrap();
     change(&mut header);
     let header = header.to_string();
-    let mut out = [&bytes[..12], &(header.len() as u32).to_le_bytes(), header.as_bytes(), &bytes[16 + length..bytes.len() - 32]].concat();
+    let mut out =
+        [&bytes[..12], &(header.len() as u32).to_le_bytes(), header.as_bytes(), &bytes[16 + length..bytes.len() - 32]]
+            .concat();
     out.extend(blake3::hash(&out).as_bytes());
     std::fs::write(to, out).unwrap();
 }
@@ -272,10 +291,15 @@ fn headers_that_make_no_sense_are_refused() {
         ("/done", json!(huge), "samples per pixel are done"),
     ];
     for (place, value, part) in cases {
-        with_header(&folder.join("a.shard"), &folder.join("altered_a.shard"), |header| *header.pointer_mut(place).unwrap() = value.clone());
+        with_header(&folder.join("a.shard"), &folder.join("altered_a.shard"), |header| {
+            *header.pointer_mut(place).unwrap() = value.clone();
+        });
         let output = run(folder, "merge altered_a.shard --partial -o a.exr");
         assert_code(&output, 6, part);
-        assert!(!String::from_utf8_lossy(&output.stderr).contains("\u{1b}") && !folder.join("a.exr").exists(), "{place}");
+        assert!(
+            !String::from_utf8_lossy(&output.stderr).contains("\u{1b}") && !folder.join("a.exr").exists(),
+            "{place}"
+        );
     }
     with_header(&folder.join("a.shard"), &folder.join("large.shard"), |header| {
         header["film"]["size"] = json!([huge, huge]);
@@ -283,7 +307,9 @@ fn headers_that_make_no_sense_are_refused() {
     });
     assert_code(&run(folder, "merge large.shard --partial -o a.exr"), 6, "a part is missing");
     // A name out of the shard does not leave the folder.
-    with_header(&folder.join("a.shard"), &folder.join("outside.shard"), |header| header["outputs"][0]["file"] = json!("../out.exr"));
+    with_header(&folder.join("a.shard"), &folder.join("outside.shard"), |header| {
+        header["outputs"][0]["file"] = json!("../out.exr");
+    });
     assert_code(&run(folder, "merge outside.shard --partial"), 2, "-o");
     assert_code(&run(folder, "merge outside.shard --partial -o a.exr"), 0, "wrote a.exr");
 }

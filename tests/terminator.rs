@@ -94,9 +94,12 @@ fn a_coarse_smooth_ball_turns_away_from_light_like_a_round_one() {
 #[test]
 fn light_beyond_the_facet_is_the_same_sought_or_found() {
     let picture = |strategy: &str, seed: u64| {
-        let sun = json!([{ "type": "directional", "direction": [-1, 0, 0.15], "irradiance": [3, 3, 3], "angular_diameter_degrees": 60 }]);
+        let sun = json!([{
+            "type": "directional", "direction": [-1, 0, 0.15], "irradiance": [3, 3, 3], "angular_diameter_degrees": 60
+        }]);
         let changes = json!({
-            "film": { "width": 48, "height": 48 }, "camera": { "vertical_fov_degrees": 6 }, "sampler": { "spp": 256, "seed": seed },
+            "film": { "width": 48, "height": 48 }, "camera": { "vertical_fov_degrees": 6 },
+            "sampler": { "spp": 256, "seed": seed },
             "integrator": { "strategy": strategy }, "lights": sun
         });
         render(&lit(json!([ball(1)]), changes))
@@ -126,12 +129,17 @@ fn raised_rays_make_no_light() {
 fn a_sheet_above_a_smooth_mesh_keeps_its_shadow() {
     let corners = [[-1.5, -1.0, 0.0], [1.5, -1.0, 0.0], [0.0, 1.6, 0.0]];
     let normals = corners.map(|[x, y, _]: [f64; 3]| [x, y, 1.5]);
-    let dome = json!({ "type": "mesh", "material": "m", "positions": corners, "normals": normals, "triangles": [[0, 1, 2]] });
-    let sheet = json!({ "type": "quad", "material": "m", "origin": [-0.6, -0.6, 0.2], "edge_u": [1.2, 0, 0], "edge_v": [0, 1.2, 0] });
+    let dome =
+        json!({ "type": "mesh", "material": "m", "positions": corners, "normals": normals, "triangles": [[0, 1, 2]] });
+    let sheet = json!({
+        "type": "quad", "material": "m", "origin": [-0.6, -0.6, 0.2], "edge_u": [1.2, 0, 0], "edge_v": [0, 1.2, 0]
+    });
     let brightness = |shapes: Value| {
         let changes = json!({
             "film": { "width": 8, "height": 8 }, "sampler": { "spp": 64 },
-            "camera": { "position": [0, -3, 0.15], "look_at": [0, -0.3, 0], "up": [0, 0, 1], "vertical_fov_degrees": 0.1 },
+            "camera": {
+                "position": [0, -3, 0.15], "look_at": [0, -0.3, 0], "up": [0, 0, 1], "vertical_fov_degrees": 0.1
+            },
             "lights": [{ "type": "directional", "direction": [0, 1, 0.04], "irradiance": [3, 3, 3] }]
         });
         Estimate::of(&render(&lit(shapes, changes)), 1).mean
@@ -162,7 +170,9 @@ fn no_light_leaks_into_a_closed_box_with_wild_vertex_normals() {
     for material in [json!({ "type": "diffuse", "albedo": 0.9 }), json!({ "type": "plastic", "roughness": 0.4 })] {
         for integrator in ["path", "whitted"] {
             let normals: Vec<[f64; 3]> = (0..8).map(|_| [0; 3].map(|_| rng.range(-1.0, 1.0))).collect();
-            let walls = json!({ "type": "mesh", "material": "m", "positions": corners, "normals": normals, "triangles": triangles });
+            let walls = json!({
+                "type": "mesh", "material": "m", "positions": corners, "normals": normals, "triangles": triangles
+            });
             let changes = json!({
                 "camera": { "position": [0.3, 0.2, 2.6], "vertical_fov_degrees": 100 },
                 "integrator": { "type": integrator, "max_depth": 8 },

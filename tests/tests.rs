@@ -3,6 +3,8 @@
 /// Embree answers alike alone, in packets and from many threads.
 mod accel_agreement;
 mod adaptive;
+/// Files of a scene that are missing or malformed.
+mod bad_files;
 /// Whatever a user gets wrong ends in one error with file and place.
 mod bad_input;
 /// Scenes beyond what can be rendered or written.
@@ -65,6 +67,8 @@ mod guiding;
 mod hygiene;
 /// What shapes, materials and instances are called in layers that pick them.
 mod identities;
+/// Renders by the program that are killed or answer signals.
+mod interrupted;
 /// The parts of the light, motion, and what denoisers need.
 mod layers;
 /// Integrators against closed forms, strategies against each other.
@@ -85,6 +89,8 @@ mod media;
 mod motion;
 /// Names of strangers: in messages, scripts and files, and where they would lead.
 mod names;
+/// Media within media.
+mod nested_media;
 /// Leaves cut out by images, for what the camera sees and for shadows.
 mod opacity;
 /// Our accelerators against the oracle: the same answers bit for bit, on anything, with bounded work.

@@ -16,7 +16,8 @@ use crate::util::render::{Prepared, merge, pixels, render_with};
 fn folder() -> Folder {
     let folder = Folder::new();
     let texel = |x: u32, y: u32| {
-        let hash = u64::from(x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_663)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let hash =
+            u64::from(x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_663)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         Luma([(hash >> 40) as u8])
     };
     ImageBuffer::from_fn(128, 128, texel).save(folder.path("noise.png")).unwrap();
@@ -31,9 +32,17 @@ fn floor(filter: &str, spp: u32, rest: Value) -> Value {
         "camera": { "position": [0, 1, 4], "look_at": [0, 0.5, 0], "vertical_fov_degrees": 40.0 },
         "sampler": { "spp": spp },
         "integrator": { "type": "path", "max_depth": 6, "strategy": "bsdf" },
-        "textures": { "noise": { "type": "image", "file": "noise.png", "filter": filter, "color_space": "linear", "scale": [100, 100] } },
-        "materials": { "floor": { "type": "diffuse", "albedo": { "texture": "noise" } }, "mirror": { "type": "mirror" } },
-        "shapes": [{ "type": "quad", "material": "floor", "origin": [-100, 0, 100], "edge_u": [200, 0, 0], "edge_v": [0, 0, -200] }],
+        "textures": {
+            "noise": {
+                "type": "image", "file": "noise.png", "filter": filter, "color_space": "linear", "scale": [100, 100]
+            }
+        },
+        "materials": {
+            "floor": { "type": "diffuse", "albedo": { "texture": "noise" } }, "mirror": { "type": "mirror" }
+        },
+        "shapes": [{
+            "type": "quad", "material": "floor", "origin": [-100, 0, 100], "edge_u": [200, 0, 0], "edge_v": [0, 0, -200]
+        }],
         "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
     });
     merge(&mut scene, rest);
@@ -51,7 +60,9 @@ fn relative_mse(reference: &Image, test: &Image) -> f64 {
 #[test]
 fn filtered_images_have_less_noise_and_converge_to_the_same_picture() {
     let folder = folder();
-    let error = |reference: &Image, filter: &str, spp: u32| relative_mse(reference, &folder.render(&floor(filter, spp, json!({}))));
+    let error = |reference: &Image, filter: &str, spp: u32| {
+        relative_mse(reference, &folder.render(&floor(filter, spp, json!({}))))
+    };
     let reference = folder.render(&floor("bilinear", 1024, json!({ "sampler": { "seed": 7 } })));
     let [points, filtered] = ["bilinear", "trilinear"].map(|filter| error(&reference, filter, 4));
     assert!(filtered < 0.2 * points, "{filtered} {points}");
@@ -83,8 +94,16 @@ fn a_mirror_shows_what_is_seen_without_it_as_sharp() {
     // Towards the floor, from before a mirror and from behind it.
     let direct = json!({ "camera": { "position": [0, 3, -4], "look_at": [0, 0, 3] } });
     let mut mirrored = json!({ "camera": { "position": [0, 3, 4], "look_at": [0, 0, -3] } });
-    let mirror = json!({ "type": "quad", "material": "mirror", "origin": [-20, 0, 0], "edge_u": [40, 0, 0], "edge_v": [0, 20, 0] });
-    let shapes = floor("trilinear", 1, json!({}))["shapes"].as_array().unwrap().iter().cloned().chain([mirror]).collect::<Vec<_>>();
+    let mirror = json!({
+        "type": "quad", "material": "mirror", "origin": [-20, 0, 0], "edge_u": [40, 0, 0], "edge_v": [0, 20, 0]
+    });
+    let shapes = floor("trilinear", 1, json!({}))["shapes"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .cloned()
+        .chain([mirror])
+        .collect::<Vec<_>>();
     mirrored["shapes"] = json!(shapes);
     let contrast_of = |mut rest: Value| {
         merge(&mut rest, json!({ "textures": { "noise": { "scale": [30, 30] } } }));
@@ -97,7 +116,8 @@ fn a_mirror_shows_what_is_seen_without_it_as_sharp() {
 fn prepared(folder: &Folder, scene: &Value, threads: u32) -> Prepared {
     let path = folder.write("scene.json", scene.to_string());
     let desc = import::load_scene(&path).unwrap();
-    let settings = Settings::new(&desc, &Overrides { threads: Some(threads as usize), ..Overrides::default() }).unwrap();
+    let settings =
+        Settings::new(&desc, &Overrides { threads: Some(threads as usize), ..Overrides::default() }).unwrap();
     Prepared { scene: compile::compile(&desc, &path).unwrap(), settings }
 }
 
@@ -108,12 +128,15 @@ fn filtered_images_are_the_same_for_any_number_of_threads_and_in_a_replay() {
     let ball = json!({ "type": "sphere", "material": "floor", "transform": [{ "translate": [0, 1, 0] }] });
     let mut scene = floor("trilinear", 3, json!({ "film": { "width": 80, "height": 70 } }));
     scene["shapes"].as_array_mut().unwrap().push(ball);
-    let images: Vec<Image> = [1, 3, 8].map(|threads| render_with(&prepared(&folder, &scene, threads), AccelKind::EMBREE).image).into();
+    let images: Vec<Image> =
+        [1, 3, 8].map(|threads| render_with(&prepared(&folder, &scene, threads), AccelKind::EMBREE).image).into();
     assert!(images.windows(2).all(|w| w[0] == w[1]));
 
     let prepared = prepared(&folder, &scene, 1);
     let accel = accel::build(AccelKind::EMBREE, &prepared.scene.geometry, 1).unwrap();
-    let sample = |s| f64::from(render::replay(&prepared.scene, &*accel, &prepared.settings, [41, 30], s).unwrap().pixel.radiance.g);
+    let sample = |s| {
+        f64::from(render::replay(&prepared.scene, &*accel, &prepared.settings, [41, 30], s).unwrap().pixel.radiance.g)
+    };
     assert_eq!(images[0].rgb(41, 30).unwrap()[1], ((0..3).map(sample).sum::<f64>() / 3.0) as f32);
 }
 

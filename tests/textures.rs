@@ -75,7 +75,9 @@ fn full_turns() -> Vec<(Value, Surface)> {
 
 /// Grey noise.
 fn noise(width: u32, height: u32) -> ImageBuffer<Luma<u8>, Vec<u8>> {
-    ImageBuffer::from_fn(width, height, |x, y| Luma([(x.wrapping_mul(97) ^ y.wrapping_mul(57)).wrapping_mul(151) as u8]))
+    ImageBuffer::from_fn(width, height, |x, y| {
+        Luma([(x.wrapping_mul(97) ^ y.wrapping_mul(57)).wrapping_mul(151) as u8])
+    })
 }
 
 /// Materials with one image, named `image.png`, in linear values.
@@ -95,7 +97,9 @@ fn with_material(mut shape: Value) -> Value {
 #[test]
 fn textures_stay_on_shapes_that_are_moved() {
     let folder = Folder::new();
-    let transform = json!([{ "scale": [1.0, 2.0, 0.5] }, { "rotate": { "axis": [1, 2, 3], "degrees": 70 } }, { "translate": [3, -2, 7] }]);
+    let transform = json!([
+        { "scale": [1.0, 2.0, 0.5] }, { "rotate": { "axis": [1, 2, 3], "degrees": 70 } }, { "translate": [3, -2, 7] }
+    ]);
     for (shape, surface) in full_turns() {
         let mut moved_shape = shape.clone();
         moved_shape["transform"] = transform.clone();
@@ -121,7 +125,8 @@ fn a_textured_mesh_is_the_same_on_any_number_of_threads() {
     use crate::util::render::{prepare, render_with};
     use steradian::render::Overrides;
     let mesh = json!([{
-        "type": "mesh", "material": "m", "positions": [[-1, -1, 0], [1, -1, 0], [1, 1, 0.5], [-1, 1, 0]], "triangles": [[0, 1, 2], [0, 2, 3]],
+        "type": "mesh", "material": "m", "positions": [[-1, -1, 0], [1, -1, 0], [1, 1, 0.5], [-1, 1, 0]],
+        "triangles": [[0, 1, 2], [0, 2, 3]],
         "uvs": [[0, 0], [3, 0], [3, 3], [0, 3]]
     }]);
     let scene = scene_of(
@@ -155,7 +160,13 @@ fn uv_are_numbers_at_poles_axes_and_origins() {
         let scene = folder.compile(&scene_of(json!([shape]), json!({}))).unwrap();
         let mut seen = 0;
         for axis in [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z] {
-            for target in [DVec3::ZERO, DVec3::new(1e-30, 0.0, 0.0), DVec3::new(0.0, -1e-30, 1e-30), DVec3::Z, DVec3::new(0.0, 0.0, 0.5)] {
+            for target in [
+                DVec3::ZERO,
+                DVec3::new(1e-30, 0.0, 0.0),
+                DVec3::new(0.0, -1e-30, 1e-30),
+                DVec3::Z,
+                DVec3::new(0.0, 0.0, 0.5),
+            ] {
                 if let Some(at) = look(&scene, target + 4.0 * axis, target) {
                     seen += 1;
                     let valid = (0.0..=1.0).contains(&at.uv.x) && (0.0..=1.0).contains(&at.uv.y);
@@ -236,8 +247,13 @@ fn tiles_on_a_plane_have_their_size_in_the_world() {
     let (size, tile) = (20.0, 0.8);
     let mut rest = one_image("repeat");
     // The corner of the plane lies at -10, so that the origin is 10 / 0.8 tiles away from it.
-    merge(&mut rest["textures"]["image"], json!({ "filter": "nearest", "scale": [size / tile, size / tile], "offset": [-12.5, -12.5] }));
-    let quad = json!([{ "type": "quad", "origin": [-10, -10, 0], "edge_u": [size, 0, 0], "edge_v": [0, size, 0], "material": "m" }]);
+    merge(
+        &mut rest["textures"]["image"],
+        json!({ "filter": "nearest", "scale": [size / tile, size / tile], "offset": [-12.5, -12.5] }),
+    );
+    let quad = json!([{
+        "type": "quad", "origin": [-10, -10, 0], "edge_u": [size, 0, 0], "edge_v": [0, size, 0], "material": "m"
+    }]);
     let scene = folder.compile(&scene_of(quad, rest)).unwrap();
     let plain = folder.compile(&scene_of(json!([{ "type": "quad", "material": "m" }]), one_image("repeat"))).unwrap();
     for i in 0..60 {
@@ -263,7 +279,10 @@ fn an_8_bit_picture_reflects_what_it_shows_and_stands_upright_in_every_integrato
     });
     picture.save(folder.path("image.png")).unwrap();
     let half = 0.5029;
-    for integrator in [json!({ "type": "path", "max_depth": 2, "strategy": "bsdf" }), json!({ "type": "whitted", "ambient": [1, 1, 1] })] {
+    for integrator in [
+        json!({ "type": "path", "max_depth": 2, "strategy": "bsdf" }),
+        json!({ "type": "whitted", "ambient": [1, 1, 1] }),
+    ] {
         let ambient = integrator["type"] == "whitted";
         let mut scene = scene_of(
             json!([{ "type": "quad", "material": "m" }]),
@@ -279,7 +298,9 @@ fn an_8_bit_picture_reflects_what_it_shows_and_stands_upright_in_every_integrato
         }
         let image = folder.render(&scene);
         let at = |x: u32, y: u32| image.rgb(x, y).unwrap();
-        for (x, y, expected) in [(5, 10, [half, 0.0, 0.0]), (10, 10, [0.0, half, 0.0]), (5, 5, [0.0, 0.0, half]), (10, 5, [half; 3])] {
+        for (x, y, expected) in
+            [(5, 10, [half, 0.0, 0.0]), (10, 10, [0.0, half, 0.0]), (5, 5, [0.0, 0.0, half]), (10, 5, [half; 3])]
+        {
             let seen = at(x, y);
             assert!(seen.iter().zip(expected).all(|(s, e)| (s - e).abs() < 1e-3), "{x} {y}: {seen:?} {expected:?}");
         }
@@ -303,7 +324,8 @@ fn images_of_any_size_and_number_of_channels_are_textures() {
     for (width, height) in [(1, 1), (3, 5), (17, 2), (64, 64)] {
         for channels in [1, 3, 4, 16] {
             save(width, height, channels);
-            let scene = folder.compile(&scene_of(json!([{ "type": "quad", "material": "m" }]), one_image("repeat"))).unwrap();
+            let scene =
+                folder.compile(&scene_of(json!([{ "type": "quad", "material": "m" }]), one_image("repeat"))).unwrap();
             let at = look(&scene, DVec3::new(0.3, 0.4, 2.0), DVec3::new(0.3, 0.4, 0.0)).unwrap();
             assert!((texel(&scene, &at).g - 0.2).abs() < 1e-6, "{width} {height} {channels}");
         }
@@ -357,7 +379,8 @@ fn products_multiply_images_and_tints() {
     ImageBuffer::from_pixel(2, 2, Rgb([51u8, 102, 255])).save(folder.path("image.png")).unwrap();
     let mut rest = one_image("repeat");
     rest["textures"]["tint"] = json!({ "type": "constant", "color": [0.5, 0.5, 0.25] });
-    rest["textures"]["tinted"] = json!({ "type": "product", "factors": [{ "texture": "image" }, { "texture": "tint" }, 0.5, [1, 0.5, 1]] });
+    rest["textures"]["tinted"] =
+        json!({ "type": "product", "factors": [{ "texture": "image" }, { "texture": "tint" }, 0.5, [1, 0.5, 1]] });
     rest["materials"]["m"]["albedo"]["texture"] = json!("tinted");
     let scene = folder.compile(&scene_of(json!([{ "type": "quad", "material": "m" }]), rest)).unwrap();
     let color = texel(&scene, &look(&scene, DVec3::Z, DVec3::ZERO).unwrap());

@@ -48,9 +48,15 @@ fn rerender_runs_no_option_of_the_file() {
     let address = listener.local_addr().unwrap();
     let victims = ["report", "json", "log-file", "checkpoint", "shard"];
     let mut provenance = output::read_settings(&dir.join("a.exr")).unwrap();
-    let line = "render scene.json --report report --json json --log-file log-file --checkpoint checkpoint -o shard --preview 0 --denoise";
+    let line = "render scene.json --report report --json json --log-file log-file --checkpoint checkpoint -o shard \
+                --preview 0 --denoise";
     let mut arguments: Vec<String> = line.split(' ').map(str::to_owned).collect();
-    arguments.extend(["--tev".to_owned(), address.to_string(), "--oidn-library".to_owned(), dir.join("evil.so").display().to_string()]);
+    arguments.extend([
+        "--tev".to_owned(),
+        address.to_string(),
+        "--oidn-library".to_owned(),
+        dir.join("evil.so").display().to_string(),
+    ]);
     provenance["arguments"] = json!(arguments);
     with_recipe(&dir.join("forged.exr"), provenance);
     victims.iter().for_each(|name| std::fs::write(dir.join(name), "kept").unwrap());
@@ -110,18 +116,25 @@ fn rerender_writes_only_the_files_of_the_command_line() {
 fn a_recipe_holds_how_the_scene_was_read() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
-    let scene = SCENE
-        .replace("\"position\": [0, 0, 4], \"look_at\": [0, 0, 0]", "\"position\": [0, 0, 4], \"look_at\": [0, 0, 0], \"shutter\": [0, 1]");
+    let scene = SCENE.replace(
+        "\"position\": [0, 0, 4], \"look_at\": [0, 0, 0]",
+        "\"position\": [0, 0, 4], \"look_at\": [0, 0, 0], \"shutter\": [0, 1]",
+    );
     let moving = r#""radius": 1, "motion": [{ "time": 0 }, { "time": 9, "transform": [{ "translate": [2, 0, 0] }] }]"#;
     std::fs::write(dir.join("moving.json"), scene.replace("\"radius\": 1", moving)).unwrap();
     for frame in [3, 4] {
-        std::fs::write(dir.join(format!("each.{frame}.json")), SCENE.replace("\"radius\": 1", &format!("\"radius\": 0.{frame}"))).unwrap();
+        std::fs::write(
+            dir.join(format!("each.{frame}.json")),
+            SCENE.replace("\"radius\": 1", &format!("\"radius\": 0.{frame}")),
+        )
+        .unwrap();
     }
     std::fs::write(
         dir.join("defined.xml"),
         r#"<scene version="3.0.0"><default name="r" value="0.2"/><sensor type="perspective"><film type="hdrfilm">
         <integer name="width" value="16"/><integer name="height" value="8"/></film></sensor><emitter type="constant"/>
-        <shape type="sphere"><float name="radius" value="$r"/><point name="center" x="0" y="0" z="3"/></shape></scene>"#,
+        <shape type="sphere"><float name="radius" value="$r"/><point name="center" x="0" y="0" z="3"/></shape>
+        </scene>"#,
     )
     .unwrap();
     for (line, file) in [
@@ -148,7 +161,14 @@ fn a_project_cannot_say_what_is_loaded_written_or_connected_to() {
     let address = format!("tev = \"{}\"", listener.local_addr().unwrap());
     let user = dir.join("config/steradian/config.toml");
     std::fs::create_dir_all(user.parent().unwrap()).unwrap();
-    for line in ["oidn-library = \"evil.so\"", "log-file = \"log\"", "output = \"o.exr\"", &address, "preview = 0", "overwrite = true"] {
+    for line in [
+        "oidn-library = \"evil.so\"",
+        "log-file = \"log\"",
+        "output = \"o.exr\"",
+        &address,
+        "preview = 0",
+        "overwrite = true",
+    ] {
         let key = line.split(' ').next().unwrap();
         std::fs::write(dir.join("steradian.toml"), format!("spp = 1\n{line}\n")).unwrap();
         let variable = format!("STERADIAN_{}", key.to_uppercase().replace('-', "_"));

@@ -31,15 +31,19 @@ fn scene_of(shape: Value) -> Value {
 }
 
 fn inline() -> Value {
-    json!({ "type": "mesh", "material": "m", "positions": CORNERS, "triangles": [[0, 1, 2], [0, 2, 3]], "colors": linear() })
+    json!({
+        "type": "mesh", "material": "m", "positions": CORNERS, "triangles": [[0, 1, 2], [0, 2, 3]], "colors": linear()
+    })
 }
 
 fn ply<T: ToString>(kind: &str, colors: [[T; 3]; 4]) -> String {
     let words = |row: &[T; 3]| row.iter().map(T::to_string).collect::<Vec<_>>().join(" ");
-    let rows: String = CORNERS.iter().zip(&colors).map(|([x, y, z], color)| format!("{x} {y} {z} {}\n", words(color))).collect();
+    let rows: String =
+        CORNERS.iter().zip(&colors).map(|([x, y, z], color)| format!("{x} {y} {z} {}\n", words(color))).collect();
     let property = |kind: &str, names: [&str; 3]| names.map(|name| format!("property {kind} {name}\n")).concat();
     format!(
-        "ply\nformat ascii 1.0\nelement vertex 4\n{}{}element face 1\nproperty list uchar int vertex_indices\nend_header\n{rows}4 0 1 2 3\n",
+        "ply\nformat ascii 1.0\nelement vertex 4\n{}{}element face 1\nproperty list uchar int vertex_indices\n\
+         end_header\n{rows}4 0 1 2 3\n",
         property("float", ["x", "y", "z"]),
         property(kind, ["red", "green", "blue"])
     )
@@ -91,7 +95,10 @@ fn every_kind_of_file_gives_the_same_picture() {
     set(&mut scene, "textures.half", json!({ "type": "product", "factors": [{ "texture": "colors" }, 0.5] }));
     set(&mut scene, "materials.m.albedo", json!({ "texture": "half" }));
     for (found, expected) in pixels(&folder.render(&scene)).zip(&expected) {
-        assert!((2.0 * Vec3::from(found) - Vec3::from(*expected)).abs().max_element() < 1e-4, "{found:?} for {expected:?}");
+        assert!(
+            (2.0 * Vec3::from(found) - Vec3::from(*expected)).abs().max_element() < 1e-4,
+            "{found:?} for {expected:?}"
+        );
     }
 }
 
@@ -112,15 +119,31 @@ fn faults_name_the_shape_and_the_material() {
     for (shape, kind, parts) in [
         (json!({ "type": "sphere", "material": "m" }), ErrorKind::Scene, ["shapes[0]", "\"m\"", "the shape has none"]),
         (json!({ "type": "cube", "material": "m" }), ErrorKind::Scene, ["shapes[0]", "\"m\"", "the shape has none"]),
-        (json!({ "type": "mesh", "material": "m", "file": "plain.obj" }), ErrorKind::Scene, ["shapes[0]", "plain.obj", "\"m\""]),
-        (json!({ "type": "mesh", "material": "m", "file": "bad.ply" }), ErrorKind::Scene, ["bad.ply", "vertex 1", "-0.25"]),
-        (json!({ "type": "mesh", "material": "m", "file": "nan.ply" }), ErrorKind::Scene, ["nan.ply", "Line 15", "NaN"]),
+        (
+            json!({ "type": "mesh", "material": "m", "file": "plain.obj" }),
+            ErrorKind::Scene,
+            ["shapes[0]", "plain.obj", "\"m\""],
+        ),
+        (
+            json!({ "type": "mesh", "material": "m", "file": "bad.ply" }),
+            ErrorKind::Scene,
+            ["bad.ply", "vertex 1", "-0.25"],
+        ),
+        (
+            json!({ "type": "mesh", "material": "m", "file": "nan.ply" }),
+            ErrorKind::Scene,
+            ["nan.ply", "Line 15", "NaN"],
+        ),
     ] {
         assert_error(&folder, &scene_of(shape), kind, &parts);
     }
     // Media are evaluated at every hit, with textures and without.
     let mut medium = scene_of(json!({ "type": "sphere", "material": "m" }));
-    set(&mut medium, "materials.m", json!({ "type": "dielectric", "priority": 1, "roughness": { "texture": "colors" } }));
+    set(
+        &mut medium,
+        "materials.m",
+        json!({ "type": "dielectric", "priority": 1, "roughness": { "texture": "colors" } }),
+    );
     assert_error(&folder, &medium, ErrorKind::Scene, &["shapes[0]", "\"m\"", "the shape has none"]);
     let mut few = scene_of(inline());
     set(&mut few, "shapes[0].colors", json!([[1, 1, 1], [0, 0, 0]]));
@@ -128,7 +151,11 @@ fn faults_name_the_shape_and_the_material() {
     // Parts of a material count, too.
     let mut mixed = good_scene();
     set(&mut mixed, "textures.colors", json!({ "type": "vertex_color" }));
-    set(&mut mixed, "textures.tinted", json!({ "type": "product", "factors": [{ "texture": "colors" }, { "texture": "tiles" }] }));
+    set(
+        &mut mixed,
+        "textures.tinted",
+        json!({ "type": "product", "factors": [{ "texture": "colors" }, { "texture": "tiles" }] }),
+    );
     set(&mut mixed, "materials.colored", json!({ "type": "plastic", "albedo": { "texture": "tinted" } }));
     set(&mut mixed, "materials.sides", json!({ "type": "two_sided", "front": "Gold", "back": "colored" }));
     set(&mut mixed, "materials.coated", json!({ "type": "coated", "base": "sides" }));
@@ -142,7 +169,11 @@ fn relief_takes_no_colours_of_vertices() {
     let folder = Folder::new();
     let texture = json!({ "texture": "colors" });
     let mut scene = scene_of(inline());
-    set(&mut scene, "materials.bumpy", json!({ "type": "relief", "material": "m", "bump_map": { "texture": "colors", "height": 1 } }));
+    set(
+        &mut scene,
+        "materials.bumpy",
+        json!({ "type": "relief", "material": "m", "bump_map": { "texture": "colors", "height": 1 } }),
+    );
     assert_error(&folder, &scene, ErrorKind::Scene, &["materials.bumpy", "\"colors\" takes attributes of meshes"]);
     // Numbers of materials are luminances.
     let mut scene = scene_of(inline());
@@ -155,10 +186,12 @@ fn relief_takes_no_colours_of_vertices() {
 
 /// A PLY file of the square with colours and numbers of vertices and faces.
 fn attributes_ply() -> String {
-    let row = |([x, y, z], i): (&[f32; 3], usize)| format!("{x} {y} {z} {} {} 0 {}\n", 0.25 * i as f32, 0.5, 0.1 * i as f32);
+    let row =
+        |([x, y, z], i): (&[f32; 3], usize)| format!("{x} {y} {z} {} {} 0 {}\n", 0.25 * i as f32, 0.5, 0.1 * i as f32);
     let rows: String = CORNERS.iter().zip(0..).map(row).collect();
     format!(
-        "ply\nformat ascii 1.0\nelement vertex 4\n{}element face 3\nproperty list uchar int vertex_indices\n{}end_header\n{rows}3 0 0 1 0.9 0.9 0.9 0.9\n\
+        "ply\nformat ascii 1.0\nelement vertex 4\n{}element face 3\nproperty list uchar int vertex_indices\n\
+         {}end_header\n{rows}3 0 0 1 0.9 0.9 0.9 0.9\n\
          3 0 1 2 1 0 0.5 0.25\n3 0 2 3 0 1 0.5 0.75\n",
         ["x", "y", "z", "tint_0", "tint_1", "tint_2", "a_0"].map(|name| format!("property float {name}\n")).concat(),
         ["tint_0", "tint_1", "tint_2", "b_0"].map(|name| format!("property float {name}\n")).concat()
@@ -173,7 +206,11 @@ fn attributes_of_vertices_and_faces_are_colours_numbers_holes_and_light() {
         let mut scene = scene_of(json!({ "type": "mesh", "material": "m", "file": "m.ply" }));
         set(&mut scene, "textures.colors", json!({ "type": "mesh_attribute", "name": attribute }));
         for (whole, changes) in [("textures.colors", of_texture), ("shapes[0]", shape)] {
-            changes.as_object().unwrap().iter().for_each(|(key, value)| set(&mut scene, &format!("{whole}.{key}"), value.clone()));
+            changes
+                .as_object()
+                .unwrap()
+                .iter()
+                .for_each(|(key, value)| set(&mut scene, &format!("{whole}.{key}"), value.clone()));
         }
         scene
     };
@@ -219,8 +256,12 @@ fn attributes_of_vertices_and_faces_are_colours_numbers_holes_and_light() {
 fn attributes_of_inline_meshes_and_their_faults() {
     let folder = Folder::new();
     folder.write("m.ply", attributes_ply());
-    let inline = json!({ "type": "mesh", "material": "m", "positions": CORNERS, "triangles": [[0, 1, 2], [0, 2, 3]],
-        "attributes": { "face_tint": [[1, 0, 0.5], [0, 1, 0.5]], "vertex_a": [0, 0.1, 0.2, 0.3], "vertex_unused": [-1, 9, 9, 9] } });
+    let inline = json!({
+        "type": "mesh", "material": "m", "positions": CORNERS, "triangles": [[0, 1, 2], [0, 2, 3]],
+        "attributes": {
+            "face_tint": [[1, 0, 0.5], [0, 1, 0.5]], "vertex_a": [0, 0.1, 0.2, 0.3], "vertex_unused": [-1, 9, 9, 9]
+        }
+    });
     let with = |shape: &Value, attribute: &str| {
         let mut scene = scene_of(shape.clone());
         set(&mut scene, "textures.colors", json!({ "type": "mesh_attribute", "name": attribute }));
@@ -231,7 +272,12 @@ fn attributes_of_inline_meshes_and_their_faults() {
         let of_file: Vec<[f32; 3]> = pixels(&folder.render(&with(&file, attribute))).collect();
         assert!(pixels(&folder.render(&with(&inline, attribute))).eq(of_file.iter().copied()), "{attribute}");
     }
-    assert_error(&folder, &with(&file, "vertex_b"), ErrorKind::Scene, &["m.ply", "\"m\"", "\"vertex_b\": the shape has none"]);
+    assert_error(
+        &folder,
+        &with(&file, "vertex_b"),
+        ErrorKind::Scene,
+        &["m.ply", "\"m\"", "\"vertex_b\": the shape has none"],
+    );
     assert_error(&folder, &with(&file, "b"), ErrorKind::Scene, &["textures.colors.name", "vertex_ or face_"]);
     assert_error(&folder, &with(&inline, "vertex_unused"), ErrorKind::Scene, &["vertex 0", "-1", "within 0 and 1"]);
     let mut bad = with(&inline, "face_tint");

@@ -26,7 +26,9 @@ fn write_scene(folder: &Path, lens: bool, output: &str) {
         "sampler": { "spp": 4 },
         "shapes": [{ "type": "sphere", "radius": 0.5 }],
         "lights": [{ "type": "environment", "radiance": [0.18, 0.18, 0.18] }],
-        "outputs": [{ "file": "a.exr", "pixel_type": "float" }, serde_json::from_str::<serde_json::Value>(output).unwrap()]
+        "outputs": [
+            { "file": "a.exr", "pixel_type": "float" }, serde_json::from_str::<serde_json::Value>(output).unwrap()
+        ]
     });
     if lens {
         scene["camera"]["lens"] = json!({ "radius": 0.5, "focus_distance": 1.0 });
@@ -60,7 +62,9 @@ fn a_png_has_its_view_and_an_exr_none() {
     run_ok(dir, "render view.json -q --integrator normal -o n.exr -o n.png --float");
     let (normal, code) = (colors(&dir.join("n.exr")), image::open(dir.join("n.png")).unwrap().into_rgb8());
     let middle = 8 * 24 + 12;
-    assert!((f32::from(code.get_pixel(12, 8).0[2]) - 255.0 * srgb_from_linear(normal[4 * middle + 2].min(1.0))).abs() < 1.0);
+    assert!(
+        (f32::from(code.get_pixel(12, 8).0[2]) - 255.0 * srgb_from_linear(normal[4 * middle + 2].min(1.0))).abs() < 1.0
+    );
     assert_eq!(run(dir, "render view.json --view film").status.code(), Some(2));
     write_scene(dir, false, r#"{ "file": "a.png", "view": "film" }"#);
     assert_eq!(run(dir, "render view.json").status.code(), Some(3));

@@ -20,7 +20,8 @@ pub struct Model {
 
 impl Model {
     fn new(name: &'static str, mut positions: Vec<[f32; 3]>, mut triangles: Vec<[u32; 3]>) -> Self {
-        let frame = positions.iter().fold(Aabb::EMPTY, |all, p| all.union(&Aabb { min: Vec3::from(*p), max: Vec3::from(*p) }));
+        let frame =
+            positions.iter().fold(Aabb::EMPTY, |all, p| all.union(&Aabb { min: Vec3::from(*p), max: Vec3::from(*p) }));
         let (center, half, first) = (frame.center(), 5.0 * frame.size().max_element(), positions.len() as u32);
         for (x, z) in [(-half, half), (half, half), (half, -half), (-half, -half)] {
             positions.push([center.x + x, frame.min.y, center.z + z]);
@@ -57,7 +58,9 @@ pub fn hare(cells: u32) -> Model {
         for i in 0..=cells {
             for j in 0..=cells - i {
                 let (s, t) = (i as f32 / cells as f32, j as f32 / cells as f32);
-                positions.push(surface((corners[0] * (1.0 - s - t) + corners[1] * s + corners[2] * t).normalize()).to_array());
+                positions.push(
+                    surface((corners[0] * (1.0 - s - t) + corners[1] * s + corners[2] * t).normalize()).to_array(),
+                );
             }
         }
         // Rows get shorter by one.
@@ -76,14 +79,17 @@ pub fn hare(cells: u32) -> Model {
 
 /// Hills of 2 `cells`² triangles over the unit square.
 pub fn hills(cells: u32) -> Model {
-    let height = |x: f32, z: f32| 0.05 * (9.0 * x).sin() * (7.0 * z).cos() + 0.01 * (61.0 * x + 13.0 * z).sin() * (53.0 * z).cos();
+    let height = |x: f32, z: f32| {
+        0.05 * (9.0 * x).sin() * (7.0 * z).cos() + 0.01 * (61.0 * x + 13.0 * z).sin() * (53.0 * z).cos()
+    };
     let vertex = |i: u32, j: u32| {
         let (x, z) = (i as f32 / cells as f32, j as f32 / cells as f32);
         [x, height(x, z), z]
     };
     let positions = (0..=cells).flat_map(|j| (0..=cells).map(move |i| vertex(i, j))).collect();
     let at = |i: u32, j: u32| j * (cells + 1) + i;
-    let cell = |i: u32, j: u32| [[at(i, j), at(i + 1, j + 1), at(i + 1, j)], [at(i, j), at(i, j + 1), at(i + 1, j + 1)]];
+    let cell =
+        |i: u32, j: u32| [[at(i, j), at(i + 1, j + 1), at(i + 1, j)], [at(i, j), at(i, j + 1), at(i + 1, j + 1)]];
     let triangles = (0..cells).flat_map(|j| (0..cells).flat_map(move |i| cell(i, j))).collect();
     Model::new("hills", positions, triangles)
 }
@@ -100,7 +106,10 @@ pub fn scans() -> Vec<Model> {
         }
         data.map(|data| Model::new(name, data.positions, data.triangles))
     };
-    [("bunny", "bunny.ply"), ("dragon", "dragon_res2.ply")].into_iter().filter_map(|(name, file)| scan(name, file)).collect()
+    [("bunny", "bunny.ply"), ("dragon", "dragon_res2.ply")]
+        .into_iter()
+        .filter_map(|(name, file)| scan(name, file))
+        .collect()
 }
 
 /// A sphere of 8 `cells`² triangles, radius 1, around the origin, without a floor.

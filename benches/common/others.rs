@@ -50,7 +50,8 @@ impl BvhCrate {
     /// Built in parallel.
     pub fn new(mesh: &Mesh) -> Self {
         let corners = |t: &[u32; 3]| t.map(|i| Point3::from(mesh.positions()[i as usize]));
-        let mut triangles: Vec<_> = mesh.triangles().iter().map(|t| BvhTriangle { corners: corners(t), node: 0 }).collect();
+        let mut triangles: Vec<_> =
+            mesh.triangles().iter().map(|t| BvhTriangle { corners: corners(t), node: 0 }).collect();
         let tree = bvh::bvh::Bvh::build_par(&mut triangles);
         Self { triangles, tree }
     }
@@ -83,7 +84,8 @@ impl Other for BvhCrate {
             if let Some(t) = Self::distance(ray, &query, triangle, scale)
                 && best.is_none_or(|(_, nearest)| t < nearest)
             {
-                let index = (std::ptr::from_ref(triangle).addr() - self.triangles.as_ptr().addr()) / size_of::<BvhTriangle>();
+                let index =
+                    (std::ptr::from_ref(triangle).addr() - self.triangles.as_ptr().addr()) / size_of::<BvhTriangle>();
                 best = Some((index as u32, t));
             }
         }
@@ -93,7 +95,9 @@ impl Other for BvhCrate {
     fn any(&self, ray: &Ray) -> bool {
         let query = Self::ray(ray);
         let scale = 1.0 / ray.direction.length();
-        self.tree.traverse_iterator(&query, &self.triangles).any(|triangle| Self::distance(ray, &query, triangle, scale).is_some())
+        self.tree
+            .traverse_iterator(&query, &self.triangles)
+            .any(|triangle| Self::distance(ray, &query, triangle, scale).is_some())
     }
 }
 
@@ -107,7 +111,8 @@ impl ObvhsCrate {
     /// With its parameters for slow builds and fast rays.
     pub fn new(mesh: &Mesh) -> Self {
         let vertex = |i: u32| glam::Vec3A::from(mesh.positions()[i as usize]);
-        let triangle = |t: &[u32; 3]| obvhs::triangle::Triangle { v0: vertex(t[0]), v1: vertex(t[1]), v2: vertex(t[2]) };
+        let triangle =
+            |t: &[u32; 3]| obvhs::triangle::Triangle { v0: vertex(t[0]), v1: vertex(t[1]), v2: vertex(t[2]) };
         let all: Vec<_> = mesh.triangles().iter().map(triangle).collect();
         let tree = build_cwbvh_from_tris(&all, obvhs::BvhBuildParams::slow_build(), &mut Duration::default());
         let triangles = tree.primitive_indices.iter().map(|i| all[*i as usize]).collect();

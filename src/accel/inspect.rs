@@ -127,7 +127,8 @@ impl StructureStats {
                 if items == 0 { stats.empty_leaves += 1 } else { stats.leaves += 1 }
             }
             if trees == 1 && root_area > 0.0 {
-                stats.sah_cost += f64::from(node.bounds.area()) / root_area * (SAH_NODE_COST + SAH_PRIM_COST * items as f64);
+                stats.sah_cost +=
+                    f64::from(node.bounds.area()) / root_area * (SAH_NODE_COST + SAH_PRIM_COST * items as f64);
             }
         });
         stats

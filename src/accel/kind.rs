@@ -37,7 +37,8 @@ pub enum AccelKind {
 
 impl AccelKind {
     /// Embree with default options.
-    pub const EMBREE: Self = Self::Embree(EmbreeOptions { quality: EmbreeQuality::Medium, robust: true, compact: false });
+    pub const EMBREE: Self =
+        Self::Embree(EmbreeOptions { quality: EmbreeQuality::Medium, robust: true, compact: false });
 
     /// Every structure with default options, with the name users choose it by.
     pub const ALL: [(Self, &'static str); 6] = [
@@ -99,7 +100,10 @@ impl fmt::Display for AccelKind {
 
 /// Why a name is none of an accelerator.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no accelerator \"{name}\"; there are {}, and options such as embree:high or embree:low+compact", kinds())]
+#[error(
+    "there is no accelerator \"{name}\"; there are {}, and options such as embree:high or embree:low+compact",
+    kinds()
+)]
 pub struct UnknownAccel {
     name: String,
 }

@@ -39,8 +39,16 @@ impl<'g> LinearAccel<'g> {
 
     /// The hit with one primitive; `triangle_ray` is `ray` prepared for triangles.
     #[inline(always)]
-    fn test(&self, ray: &Ray, triangle_ray: &TriangleRay, key: u32, Primitive { id, prim, instance }: Primitive) -> Option<Hit> {
-        let Shape::Mesh(mesh) = self.geometry.shape(id) else { return self.geometry.intersect_prim(ray, key, id, prim, instance) };
+    fn test(
+        &self,
+        ray: &Ray,
+        triangle_ray: &TriangleRay,
+        key: u32,
+        Primitive { id, prim, instance }: Primitive,
+    ) -> Option<Hit> {
+        let Shape::Mesh(mesh) = self.geometry.shape(id) else {
+            return self.geometry.intersect_prim(ray, key, id, prim, instance);
+        };
         let TriangleHit { t, u, v } = triangle_ray.intersect(&mesh.triangle_points_at(prim, ray.time))?;
         let hit = Hit { t, u, v, shape: id, prim, instance };
         self.geometry.cutouts.counts(&self.geometry.shapes, key, ray, &hit).then_some(hit)
@@ -67,7 +75,9 @@ impl Accelerator for LinearAccel<'_> {
                     // tie.
                     local.t_max = closest.map_or(ray.t_max, |best| best.t.next_up().min(ray.t_max));
                     triangle_ray.t_max = f64::from(local.t_max);
-                    let Some(hit) = self.test(&local, &triangle_ray, key, Primitive { id, prim, instance }) else { continue };
+                    let Some(hit) = self.test(&local, &triangle_ray, key, Primitive { id, prim, instance }) else {
+                        continue;
+                    };
                     if closest.is_none_or(|best| hit.is_before(&best)) {
                         closest = Some(hit);
                     }
@@ -82,8 +92,10 @@ impl Accelerator for LinearAccel<'_> {
         let key = self.geometry.cutouts.key(ray);
         let group = |local: &Ray, ids: &[ShapeId], instance| {
             let triangle_ray = TriangleRay::from(local);
-            ids.iter()
-                .any(|&id| self.prims(id).any(|prim| self.test(local, &triangle_ray, key, Primitive { id, prim, instance }).is_some()))
+            ids.iter().any(|&id| {
+                self.prims(id)
+                    .any(|prim| self.test(local, &triangle_ray, key, Primitive { id, prim, instance }).is_some())
+            })
         };
         ray.is_valid() && self.any_group(ray, group)
     }

@@ -42,7 +42,8 @@ fn read_exr(path: &Path) -> Result<RgbImage, AssetError> {
     let source = crate::file::open(path).map_err(|e| AssetError::missing(path, &e))?;
     let headers = read_headers(path).map_err(|e| malformed(&e))?;
     let choose = |(part, header): (usize, &Header)| {
-        let [r, g, b] = ["R", "G", "B"].map(|name| header.channels.list.iter().position(|channel| channel.name == *name));
+        let [r, g, b] =
+            ["R", "G", "B"].map(|name| header.channels.list.iter().position(|channel| channel.name == *name));
         Some([r?, g?, b?].map(|channel| Place { part, channel }))
     };
     let flat = headers.iter().enumerate().filter(|(_, header)| !header.deep);
@@ -50,7 +51,8 @@ fn read_exr(path: &Path) -> Result<RgbImage, AssetError> {
     let header = &headers[requested[0].part];
     // The size is checked first: memory is allocated before any pixel is read.
     let mut pixels = vec![[0.0; 3]; pixel_count(header).map_err(|e| malformed(&e))?];
-    let keep = |row: ChannelRow| row.write(pixels[row.start..].iter_mut().map(|pixel| &mut pixel[row.requested]), |v| v);
+    let keep =
+        |row: ChannelRow| row.write(pixels[row.start..].iter_mut().map(|pixel| &mut pixel[row.requested]), |v| v);
     read_rows(BufReader::new(source), &headers, &requested, false, keep).map_err(|e| malformed(&e))?;
     Ok(RgbImage { width: header.layer_size.width(), height: header.layer_size.height(), pixels })
 }

@@ -34,7 +34,8 @@ fn file_hash(path: &Path) -> Result<String, AssetError> {
 
 /// The MTL files that an OBJ names and their images, as far as they exist.
 pub fn files_of_obj(path: &Path) -> Result<BTreeSet<PathBuf>, AssetError> {
-    let read = |path: &Path| crate::file::read(path).map(crate::file::without_mark).map_err(|e| AssetError::missing(path, &e));
+    let read =
+        |path: &Path| crate::file::read(path).map(crate::file::without_mark).map_err(|e| AssetError::missing(path, &e));
     let obj = read(path)?;
     let mut files = BTreeSet::new();
     for line in obj.split(|&byte| byte == b'\n').filter(|line| line.trim_ascii_start().starts_with(b"mtllib")) {
@@ -46,7 +47,8 @@ pub fn files_of_obj(path: &Path) -> Result<BTreeSet<PathBuf>, AssetError> {
         }
         let text = read(&mtl)?;
         // A malformed one is rejected when the scene is compiled.
-        let maps = take_maps(&String::from_utf8_lossy(&text), mtl.parent().unwrap_or(Path::new(""))).map(|(_, maps)| maps);
+        let maps =
+            take_maps(&String::from_utf8_lossy(&text), mtl.parent().unwrap_or(Path::new(""))).map(|(_, maps)| maps);
         for maps in maps.unwrap_or_default().into_values() {
             let all = [maps.diffuse, maps.bump, maps.normal, maps.opacity, maps.specular, maps.emission];
             files.extend(all.into_iter().flatten().map(|ObjMap { file, .. }| file).filter(|file| file.is_file()));

@@ -39,7 +39,27 @@ impl Numbers<'_> {
     fn next(&mut self, what: &str) -> Result<(usize, f64), String> {
         let (line, word) = self.words.next().ok_or_else(|| format!("the file ends where {what} should be"))?;
         let number = word.parse::<f64>().ok().filter(|n| n.is_finite());
-        number.map(|number| (line, number)).ok_or_else(|| format!("line {line}: {what} should be a number, not \"{word}\""))
+        number
+            .map(|number| (line, number))
+            .ok_or_else(|| format!("line {line}: {what} should be a number, not \"{word}\""))
+    }
+
+    /// Passes over how the lamp's output depends on the luminaire's tilt; at rest the factor is 1.
+    fn skip_tilt(&mut self, tilt: &str) -> Result<(), String> {
+        if tilt != "INCLUDE" && tilt != "NONE" {
+            return Err(format!(
+                "TILT={tilt}: data of the tilt cannot be read from a file of its own; give TILT=NONE, or TILT=INCLUDE \
+                 and the data"
+            ));
+        }
+        if tilt == "INCLUDE" {
+            self.next("the lamp's position (TILT)")?;
+            let count = self.count("the number of tilt angles", 0)?;
+            for _ in 0..2 * count {
+                self.next("a tilt angle or multiplier")?;
+            }
+        }
+        Ok(())
     }
 
     fn positive(&mut self, what: &str) -> Result<f64, String> {
@@ -63,7 +83,10 @@ impl Numbers<'_> {
             let (line, angle) = self.next(what)?;
             let angle = angle as f32;
             if angles.last().is_some_and(|last| *last >= angle) {
-                return Err(format!("line {line}: {what}s must increase; {angle} follows {}", angles[angles.len() - 1]));
+                return Err(format!(
+                    "line {line}: {what}s must increase; {angle} follows {}",
+                    angles[angles.len() - 1]
+                ));
             }
             angles.push(angle);
         }
@@ -91,25 +114,15 @@ impl Numbers<'_> {
 
 fn parse(text: &str) -> Result<IesData, String> {
     let mut lines = text.lines().enumerate().map(|(i, line)| (i + 1, line));
-    let tilt = lines.find_map(|(_, line)| line.trim().to_ascii_uppercase().strip_prefix("TILT=").map(|tilt| tilt.trim().to_owned()));
+    let tilt = lines.find_map(|(_, line)| {
+        line.trim().to_ascii_uppercase().strip_prefix("TILT=").map(|tilt| tilt.trim().to_owned())
+    });
     let tilt = tilt.ok_or("there is no line with TILT=: not an LM-63 file")?;
-    let words = lines.flat_map(|(i, line)| line.split([' ', '\t', ',']).filter(|word| !word.is_empty()).map(move |word| (i, word)));
+    let words = lines
+        .flat_map(|(i, line)| line.split([' ', '\t', ',']).filter(|word| !word.is_empty()).map(move |word| (i, word)));
     let mut numbers = Numbers { words: words.collect::<Vec<_>>().into_iter() };
 
-    if tilt != "INCLUDE" && tilt != "NONE" {
-        return Err(format!(
-            "TILT={tilt}: data of the tilt cannot be read from a file of its own; give TILT=NONE, or TILT=INCLUDE and the data"
-        ));
-    }
-    // How the lamp's output depends on the luminaire's tilt; at rest the factor is 1.
-    if tilt == "INCLUDE" {
-        numbers.next("the lamp's position (TILT)")?;
-        let count = numbers.count("the number of tilt angles", 0)?;
-        for _ in 0..2 * count {
-            numbers.next("a tilt angle or multiplier")?;
-        }
-    }
-
+    numbers.skip_tilt(&tilt)?;
     let _lamps = numbers.next("the number of lamps")?;
     let _lumens = numbers.next("the lumens of a lamp")?;
     let multiplier = numbers.positive("the candela multiplier")?;
@@ -129,7 +142,8 @@ fn parse(text: &str) -> Result<IesData, String> {
     if vertical_count.saturating_mul(horizontal_count) > MAX_VALUES {
         return Err(format!("{vertical_count} x {horizontal_count} directions are too many"));
     }
-    let (vertical, horizontal) = (numbers.vertical_angles(vertical_count)?, numbers.horizontal_angles(horizontal_count)?);
+    let (vertical, horizontal) =
+        (numbers.vertical_angles(vertical_count)?, numbers.horizontal_angles(horizontal_count)?);
     let scale = multiplier * ballast * photometric;
     let mut candela = Vec::new();
     for _ in 0..vertical_count * horizontal_count {
@@ -150,7 +164,8 @@ fn parse(text: &str) -> Result<IesData, String> {
 mod tests {
     use super::*;
 
-    const SMALL: &str = "IESNA:LM-63-2002\n[TEST] none\n[MANUFAC] Steradian\nTILT=NONE\n1 1000 2.0 3 2 1 2 0.1 0.1 0.0\n\
+    const SMALL: &str = "IESNA:LM-63-2002\n[TEST] none\n[MANUFAC] Steradian\nTILT=NONE\n\
+                         1 1000 2.0 3 2 1 2 0.1 0.1 0.0\n\
                          0.5 1.0 10\n0 45 90\n0 90\n10 8 0\n10, 6, 0\n";
 
     #[test]

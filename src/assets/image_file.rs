@@ -40,7 +40,9 @@ fn read_bytes(bytes: &[u8], is_tga: bool) -> Result<ImageData, AssetError> {
     }
     match image::guess_format(bytes) {
         Ok(ImageFormat::OpenExr) => read_exr(bytes),
-        Ok(ImageFormat::Jpeg) if !is_whole_jpeg(bytes) => Err(AssetError::Malformed("the JPEG file is cut short".into())),
+        Ok(ImageFormat::Jpeg) if !is_whole_jpeg(bytes) => {
+            Err(AssetError::Malformed("the JPEG file is cut short".into()))
+        }
         Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Hdr)) => read_with(bytes, format),
         _ if is_tga => read_with(bytes, ImageFormat::Tga),
         _ => Err(AssetError::Malformed("not a PNG, JPEG, TGA, HDR or EXR image".into())),
@@ -83,7 +85,8 @@ fn read_with(bytes: &[u8], format: ImageFormat) -> Result<ImageData, AssetError>
     let (width, height) = image::ImageDecoder::dimensions(&decoder);
     check_size(width as usize, height as usize).map_err(AssetError::Malformed)?;
     if u64::from(width) * u64::from(height) > pixels_per_byte(format).saturating_mul(bytes.len() as u64) {
-        let message = format!("the image claims {width} x {height} pixels, more than {} bytes of {name} can hold", bytes.len());
+        let message =
+            format!("the image claims {width} x {height} pixels, more than {} bytes of {name} can hold", bytes.len());
         return Err(AssetError::Malformed(message));
     }
     let image = DynamicImage::from_decoder(decoder).map_err(|e| malformed(&e))?;
@@ -126,16 +129,23 @@ fn read_exr(bytes: &[u8]) -> Result<ImageData, AssetError> {
         (Some(r), Some(g), Some(b), _) => vec![r, g, b],
         (.., Some(y)) => vec![y],
         _ if all.len() == 1 => vec![0],
-        _ => return Err(AssetError::Malformed("the EXR image has several channels, but neither R, G and B nor Y".into())),
+        _ => {
+            return Err(AssetError::Malformed(
+                "the EXR image has several channels, but neither R, G and B nor Y".into(),
+            ));
+        }
     };
     chosen.extend(find("A"));
     let requested: Vec<Place> = chosen.iter().map(|&channel| Place { part, channel }).collect();
     let (width, height, channels) = (size.width(), size.height(), chosen.len());
-    let read =
-        |keep: &mut dyn FnMut(ChannelRow)| read_rows(Cursor::new(bytes), &headers, &requested, false, keep).map_err(|e| malformed(&e));
+    let read = |keep: &mut dyn FnMut(ChannelRow)| {
+        read_rows(Cursor::new(bytes), &headers, &requested, false, keep).map_err(|e| malformed(&e))
+    };
     let samples = if chosen.iter().all(|&channel| all[channel].sample_type == SampleType::F16) {
         let mut out = vec![f16::ZERO; width * height * channels];
-        read(&mut |row| row.write(out[channels * row.start + row.requested..].iter_mut().step_by(channels), f16::from_f32))?;
+        read(&mut |row| {
+            row.write(out[channels * row.start + row.requested..].iter_mut().step_by(channels), f16::from_f32);
+        })?;
         Samples::F16(out)
     } else {
         let mut out = vec![0.0; width * height * channels];

@@ -66,7 +66,8 @@ impl MeshData {
     /// The positions as a scene file has them: of the numbers that round to those of the mesh, the shortest.
     pub fn written_positions(&self) -> Vec<[f64; 3]> {
         let shortest = |x: f32| x.to_string().parse().unwrap_or(f64::from(x));
-        let written = |p: &[f32; 3]| if self.origin == [0.0; 3] { p.map(shortest) } else { self.position(*p).to_array() };
+        let written =
+            |p: &[f32; 3]| if self.origin == [0.0; 3] { p.map(shortest) } else { self.position(*p).to_array() };
         self.positions.iter().map(written).collect()
     }
 
@@ -78,8 +79,11 @@ impl MeshData {
     /// Adds another mesh with the same attributes.
     pub(super) fn append(&mut self, mut other: Self) -> Result<(), AssetError> {
         debug_assert_eq!(self.origin, other.origin);
-        let first = u32::try_from(self.positions.len()).ok().filter(|&first| (u32::MAX - first) as usize >= other.positions.len());
-        let first = first.ok_or_else(|| AssetError::Malformed("the file has more than 4,294,967,295 vertices".into()))?;
+        let first = u32::try_from(self.positions.len())
+            .ok()
+            .filter(|&first| (u32::MAX - first) as usize >= other.positions.len());
+        let first =
+            first.ok_or_else(|| AssetError::Malformed("the file has more than 4,294,967,295 vertices".into()))?;
         self.positions.append(&mut other.positions);
         self.triangles.extend(other.triangles.iter().map(|triangle| triangle.map(|i| i + first)));
         if let (Some(normals), Some(others)) = (&mut self.normals, &mut other.normals) {
@@ -105,7 +109,12 @@ impl MeshData {
             *values = values.gathered(self.triangles.as_flattened().iter().copied());
         }
         for values in [Some(&mut self.positions), self.normals.as_mut()].into_iter().flatten() {
-            *values = self.triangles.as_flattened().iter().map(|&i| values.get(i as usize).copied().unwrap_or_default()).collect();
+            *values = self
+                .triangles
+                .as_flattened()
+                .iter()
+                .map(|&i| values.get(i as usize).copied().unwrap_or_default())
+                .collect();
         }
         self.uvs = Some(corners.repeat(self.triangles.len()));
         self.triangles = (0..self.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();

@@ -57,7 +57,9 @@ impl AssetError {
             Self::Missing { file, message } => {
                 Error::Missing { file, message: format!("{message} (named by {}: {path})", scene.display()) }
             }
-            Self::Malformed(message) => Error::Asset { scene: scene.into(), path: path.into(), asset: asset.into(), message },
+            Self::Malformed(message) => {
+                Error::Asset { scene: scene.into(), path: path.into(), asset: asset.into(), message }
+            }
         }
     }
 }

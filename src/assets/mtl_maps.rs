@@ -80,7 +80,8 @@ pub fn take_maps(text: &str, folder: &Path) -> Result<(String, HashMap<String, O
 
 /// A map's options and file; the file's name is all that follows the options, blanks included.
 fn parse_map(words: SplitWhitespace, line: &str, folder: &Path) -> Result<ObjMap, String> {
-    let mut map = ObjMap { file: PathBuf::new(), scale: [1.0; 2], offset: [0.0; 2], clamp: false, height: 1.0, channel: None };
+    let mut map =
+        ObjMap { file: PathBuf::new(), scale: [1.0; 2], offset: [0.0; 2], clamp: false, height: 1.0, channel: None };
     let mut words = words.peekable();
     while let Some(word) = words.next_if(|word| word.starts_with('-') && word.len() > 1) {
         let mut numbers = |most: usize| -> Vec<f32> {
@@ -112,7 +113,8 @@ fn parse_map(words: SplitWhitespace, line: &str, folder: &Path) -> Result<ObjMap
     // A word of the rest may also stand among the options: the name starts at its last occurrence that the rest of the
     // words follow.
     let rest: Vec<&str> = std::iter::once(first).chain(words).collect();
-    let start = line.rmatch_indices(first).map(|(at, _)| at).find(|&at| line[at..].split_whitespace().eq(rest.iter().copied()));
+    let start =
+        line.rmatch_indices(first).map(|(at, _)| at).find(|&at| line[at..].split_whitespace().eq(rest.iter().copied()));
     let name = line[start.unwrap_or(0)..].trim().replace('\\', "/");
     map.file = folder.join(name);
     if !map.scale.iter().chain(&map.offset).chain([&map.height]).all(|x| x.is_finite()) {
@@ -134,7 +136,8 @@ mod tests {
     fn files_and_options_are_distinguished() {
         let plain = maps("  map_Kd wall.png").diffuse.unwrap();
         assert_eq!((plain.file, plain.scale, plain.clamp), ("textures/wall.png".into(), [1.0; 2], false));
-        let all = maps("map_Kd -blendu on -s 2 3 1 -o 0.5 -clamp on -imfchan r -mm 0 1 old\\my wall.png").diffuse.unwrap();
+        let all =
+            maps("map_Kd -blendu on -s 2 3 1 -o 0.5 -clamp on -imfchan r -mm 0 1 old\\my wall.png").diffuse.unwrap();
         assert_eq!((all.file, all.scale, all.offset), ("textures/old/my wall.png".into(), [2.0, 3.0], [0.5, 0.0]));
         assert_eq!((all.clamp, all.channel), (true, Some('r')));
         let bump = maps("map_Bump -bm 0.25 b.png");
@@ -146,7 +149,8 @@ mod tests {
 
     #[test]
     fn maps_leave_the_other_lines_where_they_are() {
-        let (rest, all) = take_maps("newmtl a\nKd 1 1 1\nmap_Kd x.png\nnewmtl b\nbump y.png\nNs 3\n", Path::new("")).unwrap();
+        let (rest, all) =
+            take_maps("newmtl a\nKd 1 1 1\nmap_Kd x.png\nnewmtl b\nbump y.png\nNs 3\n", Path::new("")).unwrap();
         assert_eq!(rest, "newmtl a\nKd 1 1 1\n\nnewmtl b\n\nNs 3\n");
         assert!(all["a"].bump.is_none() && all["b"].bump.is_some());
     }

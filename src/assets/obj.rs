@@ -72,7 +72,8 @@ pub fn read_obj(path: &Path, materials: bool) -> Result<Vec<ObjMesh>, AssetError
             return Ok(Default::default());
         }
         let mtl = folder.join(mtl);
-        let parsed = read_mtl(&mtl, &maps).and_then(|text| tobj::load_mtl_buf(&mut text.as_bytes()).map_err(|e| mtl_fault(&mtl, &e)));
+        let parsed = read_mtl(&mtl, &maps)
+            .and_then(|text| tobj::load_mtl_buf(&mut text.as_bytes()).map_err(|e| mtl_fault(&mtl, &e)));
         parsed.map_err(|e| {
             trouble.borrow_mut().get_or_insert(e);
             tobj::LoadError::ReadError
@@ -90,7 +91,8 @@ pub fn read_obj(path: &Path, materials: bool) -> Result<Vec<ObjMesh>, AssetError
             return Err(AssetError::Malformed(format!("line {line}: no material named \"{name}\" in the MTL")));
         }
     }
-    let library: Vec<ObjMaterial> = library.iter().map(|m| from_mtl(m, maps.get(&m.name).cloned().unwrap_or_default())).collect();
+    let library: Vec<ObjMaterial> =
+        library.iter().map(|m| from_mtl(m, maps.get(&m.name).cloned().unwrap_or_default())).collect();
     let mut meshes = join_models(&models, &library)?;
     if meshes.is_empty() {
         if used.vertices == 0 {
@@ -184,7 +186,8 @@ fn from_tobj(mesh: &tobj::Mesh) -> MeshData {
     let positions = triples(&mesh.positions);
     let normals = triples(&mesh.normals);
     let uvs = mesh.texcoords.as_chunks::<2>().0.to_vec();
-    let colors: Vec<[f32; 3]> = mesh.vertex_color.as_chunks::<3>().0.iter().map(|color| color.map(linear_from_srgb)).collect();
+    let colors: Vec<[f32; 3]> =
+        mesh.vertex_color.as_chunks::<3>().0.iter().map(|color| color.map(linear_from_srgb)).collect();
     let colors = (colors.len() == positions.len()).then_some(colors);
     MeshData {
         normals: (normals.len() == positions.len()).then_some(normals),
@@ -214,8 +217,10 @@ mod tests {
     fn materials_split_the_mesh_and_groups_do_not() {
         let folder = tempfile::tempdir().unwrap();
         write(&folder, "m.mtl", "newmtl a\nKd 0.1 0.2 0.3\nnewmtl b\nKe 1 2 3\nKd 0.5\nTr 0.25\n");
-        let text =
-            format!("mtllib m.mtl\n{QUAD}g one\nusemtl a\nf 1/1 2/2 3/3 4/4\nusemtl b\nf -4 -3 -2\ng two\nusemtl a\nf 1/1 2/2 3/3\n");
+        let text = format!(
+            "mtllib m.mtl\n{QUAD}g one\nusemtl a\nf 1/1 2/2 3/3 4/4\nusemtl b\nf -4 -3 -2\ng two\nusemtl a\n\
+             f 1/1 2/2 3/3\n"
+        );
         let meshes = read_obj(&write(&folder, "q.obj", &text), true).unwrap();
         assert_eq!(meshes.len(), 2);
         assert_eq!(meshes[0].mesh.triangles, [[0, 1, 2], [0, 2, 3], [4, 5, 6]]);
@@ -230,8 +235,13 @@ mod tests {
     fn a_byte_order_mark_hides_no_line() {
         let folder = tempfile::tempdir().unwrap();
         write(&folder, "m.mtl", "\u{feff}newmtl a\nKd 0.1 0.2 0.3\n");
-        let meshes = read_obj(&write(&folder, "q.obj", format!("\u{feff}{QUAD}mtllib m.mtl\nusemtl a\nf 1 2 3 4\n")), true).unwrap();
-        assert_eq!((meshes[0].mesh.positions.len(), meshes[0].material.as_ref().unwrap().diffuse), (4, Some([0.1, 0.2, 0.3])));
+        let meshes =
+            read_obj(&write(&folder, "q.obj", format!("\u{feff}{QUAD}mtllib m.mtl\nusemtl a\nf 1 2 3 4\n")), true)
+                .unwrap();
+        assert_eq!(
+            (meshes[0].mesh.positions.len(), meshes[0].material.as_ref().unwrap().diffuse),
+            (4, Some([0.1, 0.2, 0.3]))
+        );
     }
 
     #[test]

@@ -59,16 +59,22 @@ pub fn check_obj(text: &str) -> Result<ObjUse, AssetError> {
                 numbers::<3>(words).ok_or_else(|| at("a normal needs three numbers"))?;
                 counts[2] += 1;
             }
-            Some("f") => words.try_for_each(|corner| check_corner(corner, &counts, &mut largest, i + 1)).map_err(|e| at(&e))?,
+            Some("f") => {
+                words.try_for_each(|corner| check_corner(corner, &counts, &mut largest, i + 1)).map_err(|e| at(&e))?;
+            }
             Some("l") => used.has_lines = true,
             Some("mtllib") => used.names_a_library = true,
-            Some("usemtl") => used.materials.push((i + 1, line.trim().split_once(' ').unwrap_or_default().1.trim().to_owned())),
+            Some("usemtl") => {
+                used.materials.push((i + 1, line.trim().split_once(' ').unwrap_or_default().1.trim().to_owned()));
+            }
             _ => {}
         }
     }
     for ((what, (index, line)), count) in ATTRIBUTES.iter().zip(largest).zip(counts) {
         if index > count {
-            return Err(AssetError::Malformed(format!("line {line}: a face refers to {what} {index}, but there are only {count}")));
+            return Err(AssetError::Malformed(format!(
+                "line {line}: a face refers to {what} {index}, but there are only {count}"
+            )));
         }
     }
     Ok(used)

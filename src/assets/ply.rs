@@ -9,7 +9,8 @@ use std::path::Path;
 
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{
-    DefaultElement, ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
+    DefaultElement, ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,
+    ScalarType,
 };
 
 use super::ply_attributes::{self, Column};
@@ -138,7 +139,8 @@ fn parse_with(source: impl BufRead, requested: Option<&BTreeSet<String>>) -> Res
 /// The parser's messages run over several lines: what, the text in question, and the same again in other words.
 fn malformed(place: &str, error: &dyn std::fmt::Display) -> AssetError {
     let text = error.to_string();
-    let lines: Vec<&str> = text.lines().map(str::trim).filter(|line| !line.chars().all(|c| c == '\'')).take(2).collect();
+    let lines: Vec<&str> =
+        text.lines().map(str::trim).filter(|line| !line.chars().all(|c| c == '\'')).take(2).collect();
     AssetError::Malformed(format!("not a valid PLY file: {place}{}", lines.join(" ")))
 }
 
@@ -155,7 +157,8 @@ fn read_elements<E: PropertyAccess>(
     while first < element.count {
         some.count = AT_ONCE.min(element.count - first);
         let elements = parser.read_payload_for_element(reader, &some, header).map_err(|e| {
-            let place = if first > 0 { format!("after {first} of {} elements: ", element.count) } else { String::new() };
+            let place =
+                if first > 0 { format!("after {first} of {} elements: ", element.count) } else { String::new() };
             malformed(&place, &e)
         })?;
         take(first, elements);
@@ -183,9 +186,16 @@ fn take_vertices(mesh: &mut MeshData, vertices: &[Vertex], element: &ElementDef)
 }
 
 /// The attributes of an element, and the element with their properties marked.
-fn columns(element: &ElementDef, prefix: &str, requested: Option<&BTreeSet<String>>) -> (ElementDef, Vec<(Column, AttributeValues)>) {
+fn columns(
+    element: &ElementDef,
+    prefix: &str,
+    requested: Option<&BTreeSet<String>>,
+) -> (ElementDef, Vec<(Column, AttributeValues)>) {
     let columns = ply_attributes::columns(element, prefix, requested);
-    (ply_attributes::marked(element, &columns), columns.into_iter().map(|column| (column.clone(), column.values())).collect())
+    (
+        ply_attributes::marked(element, &columns),
+        columns.into_iter().map(|column| (column.clone(), column.values())).collect(),
+    )
 }
 
 /// A list for the colours of an element, if it has any and `requested` includes them.

@@ -10,8 +10,28 @@ use crate::attribute::AttributeValues;
 const ENDINGS: [&str; 4] = ["xyzw", "rgba", "0123", "1234"];
 
 /// Properties that are something else.
-const RESERVED: [&str; 20] =
-    ["x", "y", "z", "nx", "ny", "nz", "u", "v", "s", "t", "texture_u", "texture_v", "r", "g", "b", "a", "red", "green", "blue", "alpha"];
+const RESERVED: [&str; 20] = [
+    "x",
+    "y",
+    "z",
+    "nx",
+    "ny",
+    "nz",
+    "u",
+    "v",
+    "s",
+    "t",
+    "texture_u",
+    "texture_v",
+    "r",
+    "g",
+    "b",
+    "a",
+    "red",
+    "green",
+    "blue",
+    "alpha",
+];
 
 /// What the properties of an attribute are called while the file is read: no name of a file has this character.
 const MARK: &str = "\n";
@@ -28,7 +48,11 @@ pub struct Column {
 impl Column {
     /// Nothing yet.
     pub fn values(&self) -> AttributeValues {
-        if self.properties.len() == 1 { AttributeValues::Numbers(Vec::new()) } else { AttributeValues::Colors(Vec::new()) }
+        if self.properties.len() == 1 {
+            AttributeValues::Numbers(Vec::new())
+        } else {
+            AttributeValues::Colors(Vec::new())
+        }
     }
 }
 
@@ -67,7 +91,9 @@ pub fn columns(element: &ElementDef, prefix: &str, requested: Option<&BTreeSet<S
     };
     let mut found: Vec<Column> = Vec::new();
     for column in groups.into_iter().filter(|group| matches!(group.properties.len(), 1 | 3)).map(column) {
-        if requested.is_none_or(|requested| requested.contains(&column.name)) && !found.iter().any(|other| other.name == column.name) {
+        if requested.is_none_or(|requested| requested.contains(&column.name))
+            && !found.iter().any(|other| other.name == column.name)
+        {
             found.push(column);
         }
     }
@@ -120,7 +146,9 @@ mod tests {
     fn found(names: &[&str]) -> Vec<(String, usize)> {
         let mut element = ElementDef::new("vertex".into());
         for name in names {
-            element.properties.insert((*name).into(), PropertyDef::new((*name).into(), PropertyType::Scalar(ScalarType::Float)));
+            element
+                .properties
+                .insert((*name).into(), PropertyDef::new((*name).into(), PropertyType::Scalar(ScalarType::Float)));
         }
         columns(&element, "vertex_", None).into_iter().map(|column| (column.name, column.properties.len())).collect()
     }
@@ -134,9 +162,15 @@ mod tests {
         assert_eq!(found(&["foo_bar_x", "foo_bar_y", "foo_bar_z"]), one("vertex_foo_bar", 3));
         assert_eq!(found(&["foo_1", "foo_2", "foo_3"]), one("vertex_foo", 3));
         assert_eq!(found(&["temp_0", "foo", "temp_1"]), one("vertex_temp", 1));
-        for none in
-            [&["temp"][..], &["temp_0", "temp_1"], &["a_0", "a_1", "a_2", "a_3"], &["r", "g", "b"], &["texture_u"], &["a_q"], &["_0"]]
-        {
+        for none in [
+            &["temp"][..],
+            &["temp_0", "temp_1"],
+            &["a_0", "a_1", "a_2", "a_3"],
+            &["r", "g", "b"],
+            &["texture_u"],
+            &["a_q"],
+            &["_0"],
+        ] {
             assert_eq!(found(none), [], "{none:?}");
         }
         let two = found(&["a_0", "a_1", "a_2", "b_0", "b_1", "b_2"]);

@@ -50,7 +50,8 @@ pub enum Answer {
 
 /// The answers to many rays, with all threads of the current pool.
 pub fn answers(accel: &dyn Accelerator, rays: &[Ray], any_hit: bool) -> Vec<Answer> {
-    let answer = |ray: &Ray| if any_hit { Answer::Any(accel.occluded(ray)) } else { Answer::Closest(accel.intersect(ray)) };
+    let answer =
+        |ray: &Ray| if any_hit { Answer::Any(accel.occluded(ray)) } else { Answer::Closest(accel.intersect(ray)) };
     rays.par_iter().with_min_len(256).map(answer).collect()
 }
 
@@ -121,11 +122,7 @@ fn classify(geometry: &Geometry, ray: &Ray, a: Option<&Hit>, b: Option<&Hit>) ->
         (None, None) => Class::Identical,
         (Some(a), Some(b)) if a == b => Class::Identical,
         (Some(a), Some(b)) if within_bound(geometry, ray, a, b) => {
-            if (a.instance, a.shape, a.prim) == (b.instance, b.shape, b.prim) {
-                Class::WithinBound
-            } else {
-                Class::Tie
-            }
+            if (a.instance, a.shape, a.prim) == (b.instance, b.shape, b.prim) { Class::WithinBound } else { Class::Tie }
         }
         _ => Class::Different,
     }
@@ -137,7 +134,8 @@ fn classify(geometry: &Geometry, ray: &Ray, a: Option<&Hit>, b: Option<&Hit>) ->
 pub fn within_bound(geometry: &Geometry, ray: &Ray, a: &Hit, b: &Hit) -> bool {
     let length = f64::from(ray.direction.length());
     let slack = |hit: &Hit| {
-        let cosine = geometry.interaction(ray, hit).map_or(1.0, |at| f64::from(at.n_g.dot(ray.direction).abs()) / length);
+        let cosine =
+            geometry.interaction(ray, hit).map_or(1.0, |at| f64::from(at.n_g.dot(ray.direction).abs()) / length);
         let instanced = if hit.instance == Hit::NO_INSTANCE { 0.0 } else { f64::from(ray.origin.abs().max_element()) };
         16.0 * UNIT_ROUNDOFF * f64::from(hit.t)
             + 4.0 * UNIT_ROUNDOFF * (reach(geometry, ray, hit) + instanced) / (length * cosine.max(1e-6))
@@ -150,7 +148,11 @@ pub fn within_bound(geometry: &Geometry, ray: &Ray, a: &Hit, b: &Hit) -> bool {
 fn reach(geometry: &Geometry, ray: &Ray, hit: &Hit) -> f64 {
     let Shape::Mesh(mesh) = geometry.shape(hit.shape) else { return 0.0 };
     let points = mesh.triangle_points_at(hit.prim, ray.time);
-    let origin = if hit.instance == Hit::NO_INSTANCE { ray.origin } else { geometry.instance(hit.instance).object_ray(ray).origin };
+    let origin = if hit.instance == Hit::NO_INSTANCE {
+        ray.origin
+    } else {
+        geometry.instance(hit.instance).object_ray(ray).origin
+    };
     let far = [points.a, points.b, points.c].map(|p| (p - origin).abs().max_element());
     f64::from(far[0].max(far[1]).max(far[2]))
 }
@@ -158,8 +160,17 @@ fn reach(geometry: &Geometry, ray: &Ray, hit: &Hit) -> f64 {
 /// A hit as text.
 pub fn describe(hit: Option<&Hit>) -> String {
     let Some(hit) = hit else { return "no hit".into() };
-    let instance = if hit.instance == Hit::NO_INSTANCE { String::new() } else { format!(" instance {}", hit.instance.0) };
-    format!("t {} ({:#010x}) shape {} primitive {}{instance} u {} v {}", hit.t, hit.t.to_bits(), hit.shape.0, hit.prim.0, hit.u, hit.v)
+    let instance =
+        if hit.instance == Hit::NO_INSTANCE { String::new() } else { format!(" instance {}", hit.instance.0) };
+    format!(
+        "t {} ({:#010x}) shape {} primitive {}{instance} u {} v {}",
+        hit.t,
+        hit.t.to_bits(),
+        hit.shape.0,
+        hit.prim.0,
+        hit.u,
+        hit.v
+    )
 }
 
 fn occlusion(occluded: bool) -> String {
@@ -196,5 +207,9 @@ pub fn parse_ray(text: &str) -> Result<Ray, String> {
         t_max: at(1, f32::INFINITY),
         time: at(2, 0.0),
     };
-    if ray.is_valid() { Ok(ray) } else { Err("not a ray: numbers must be finite, the direction not zero, 0 <= t_min <= t_max".into()) }
+    if ray.is_valid() {
+        Ok(ray)
+    } else {
+        Err("not a ray: numbers must be finite, the direction not zero, 0 <= t_min <= t_max".into())
+    }
 }

@@ -86,7 +86,8 @@ mod tests {
 
     #[test]
     fn a_command_reads_its_input_and_returns_its_status() {
-        let ended = run(Command::new("sh").args(["-c", "cat; echo no >&2; exit 3"]), Some("a text"), &AtomicBool::new(false));
+        let ended =
+            run(Command::new("sh").args(["-c", "cat; echo no >&2; exit 3"]), Some("a text"), &AtomicBool::new(false));
         let ended = ended.unwrap().unwrap();
         assert_eq!((ended.status.code(), ended.stdout.as_str(), ended.stderr.as_str()), (Some(3), "a text", "no"));
         assert_eq!(tail(&"ab ".repeat(1000)).chars().count(), TAIL);
@@ -105,12 +106,17 @@ mod tests {
                 }
                 stop.store(true, Ordering::Relaxed);
             });
-            run(Command::new("sh").args(["-c", "sleep 300 & echo $! >pid; touch started; wait"]).current_dir(&folder), None, &stop)
+            run(
+                Command::new("sh").args(["-c", "sleep 300 & echo $! >pid; touch started; wait"]).current_dir(&folder),
+                None,
+                &stop,
+            )
         });
         assert!(ended.unwrap().is_none() && started.exists());
         // Whoever takes over an orphan reaps it later; until then it is a zombie.
         let pid = std::fs::read_to_string(grandchild).unwrap();
-        let is_running = || std::fs::read_to_string(format!("/proc/{}/stat", pid.trim())).is_ok_and(|stat| !stat.contains(") Z "));
+        let is_running =
+            || std::fs::read_to_string(format!("/proc/{}/stat", pid.trim())).is_ok_and(|stat| !stat.contains(") Z "));
         let start = Instant::now();
         while is_running() {
             assert!(start.elapsed() < Duration::from_secs(60));

@@ -145,7 +145,8 @@ mod tests {
     #[test]
     fn surfaces_in_foreign_boxes_count_by_their_area() {
         // Two right triangles side by side in the plane z = 0, with areas 1/2 and 1/2.
-        let positions = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0], [2.0, 1.0, 0.0]];
+        let positions =
+            vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0], [2.0, 1.0, 0.0]];
         let mesh = Mesh::new(positions, vec![[0, 1, 2], [3, 4, 5]], None, None).unwrap();
         let geometry = Geometry { shapes: vec![Shape::Mesh(mesh)], world: vec![ShapeId(0)], ..Geometry::default() };
         let unit = |x: f32, width: f32| Aabb { min: Vec3::new(x, 0.0, -1.0), max: Vec3::new(x + width, 1.0, 1.0) };

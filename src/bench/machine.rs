@@ -23,7 +23,8 @@ impl Machine {
     /// This machine, now.
     pub fn here() -> Self {
         let info = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-        let processor = info.lines().find_map(|line| line.strip_prefix("model name")).and_then(|line| line.split_once(':'));
+        let processor =
+            info.lines().find_map(|line| line.strip_prefix("model name")).and_then(|line| line.split_once(':'));
         let load = fs::read_to_string("/proc/loadavg").ok().and_then(|text| text.split(' ').next()?.parse().ok());
         Self {
             processor: processor.map_or("unknown", |(_, name)| name.trim()).to_owned(),
@@ -37,7 +38,10 @@ impl Machine {
     /// In one line, with the version.
     pub fn line(&self) -> String {
         let load = self.load.map_or(String::new(), |load| format!(", load {load:.2} before"));
-        format!("{} ({}, {} threads{load}), steradian {}", self.processor, self.instruction_set, self.threads, self.version)
+        format!(
+            "{} ({}, {} threads{load}), steradian {}",
+            self.processor, self.instruction_set, self.threads, self.version
+        )
     }
 }
 

@@ -176,7 +176,13 @@ const ORACLE_TESTS: u64 = 200_000_000;
 ///
 /// # Errors
 /// If an accelerator cannot be built.
-pub fn bench_scene(name: &str, geometry: &Geometry, sets: &[RaySet], options: &Options, watch: &dyn Watch) -> Result<SceneReport> {
+pub fn bench_scene(
+    name: &str,
+    geometry: &Geometry,
+    sets: &[RaySet],
+    options: &Options,
+    watch: &dyn Watch,
+) -> Result<SceneReport> {
     let primitives: usize = geometry.shapes.iter().map(crate::geometry::Shape::prim_count).sum();
     let mut accels: Vec<Measured> = Vec::new();
     for &kind in &options.accels {
@@ -209,7 +215,10 @@ pub fn bench_scene(name: &str, geometry: &Geometry, sets: &[RaySet], options: &O
     report.oracle = match oracle {
         None => format!("linear, on {compared} rays"),
         Some(i) => {
-            format!("linear, on {compared} rays; beyond them {}, which gave the same answers bit for bit on those", accels[i].0.name)
+            format!(
+                "linear, on {compared} rays; beyond them {}, which gave the same answers bit for bit on those",
+                accels[i].0.name
+            )
         }
     };
     report.accels = accels.into_iter().map(|(report, _)| report).collect();
@@ -238,7 +247,11 @@ fn build<'g>(kind: AccelKind, geometry: &'g Geometry, primitives: usize, options
             black_box(again.memory_bytes());
         }
         let milliseconds = median_and_range(&times);
-        builds.push(BuildReport { threads, milliseconds, mprims_per_second: primitives as f64 / milliseconds[0].max(1e-9) * 1e-3 });
+        builds.push(BuildReport {
+            threads,
+            milliseconds,
+            mprims_per_second: primitives as f64 / milliseconds[0].max(1e-9) * 1e-3,
+        });
     }
     let structure = accel.inspect().map(|inspect| {
         let stats = StructureStats::of(inspect);
@@ -305,7 +318,9 @@ impl Replay<'_> {
         let counts: Vec<usize> = accels.iter().map(|(report, _)| rays_of(report)).collect();
         let rates = self.rates(set, accels, &counts)?;
         for ((((report, accel), agreement), rates), rays) in accels.iter_mut().zip(agreements).zip(rates).zip(counts) {
-            let counted = accel.inspect().map(|inspect| work_per_ray(inspect, &set.rays[..rays.min(COUNTED)], set.kind.is_any_hit()));
+            let counted = accel
+                .inspect()
+                .map(|inspect| work_per_ray(inspect, &set.rays[..rays.min(COUNTED)], set.kind.is_any_hit()));
             let rates = rates.iter().map(|(mode, threads, rates)| RateReport {
                 mode: *mode,
                 threads: *threads,
@@ -346,8 +361,10 @@ impl Replay<'_> {
     fn rates(&self, set: &RaySet, accels: &[Measured], counts: &[usize]) -> Result<Vec<Rates>> {
         let Self { name, options, watch, .. } = self;
         let of_threads = |mode: Mode| options.threads.iter().map(move |&threads| (mode, threads, Vec::new()));
-        let mut times: Vec<Rates> =
-            accels.iter().map(|(report, _)| modes(set.kind, &report.name).iter().flat_map(|&mode| of_threads(mode)).collect()).collect();
+        let mut times: Vec<Rates> = accels
+            .iter()
+            .map(|(report, _)| modes(set.kind, &report.name).iter().flat_map(|&mode| of_threads(mode)).collect())
+            .collect();
         for round in 0..=options.rounds {
             watch.step(&format!("{name}: {} rays, round {round} of {}", set.kind.name(), options.rounds));
             for (i, (_, accel)) in accels.iter().enumerate() {

@@ -119,13 +119,16 @@ mod tests {
     fn meshes_are_closed_with_the_front_outside() {
         for mesh in [bumpy_sphere(1_000), head(968)] {
             let points = |prim| mesh.triangle_points(crate::id::PrimId::new(prim));
-            let volume: f64 =
-                (0..mesh.triangles().len()).map(points).map(|p| p.a.as_dvec3().dot(p.b.as_dvec3().cross(p.c.as_dvec3())) / 6.0).sum();
+            let volume: f64 = (0..mesh.triangles().len())
+                .map(points)
+                .map(|p| p.a.as_dvec3().dot(p.b.as_dvec3().cross(p.c.as_dvec3())) / 6.0)
+                .sum();
             assert!(volume > 2.0 && volume < 6.0, "{volume}");
             let mut edges = std::collections::HashMap::new();
             for &[a, b, c] in mesh.triangles() {
                 for edge in [[a, b], [b, c], [c, a]] {
-                    *edges.entry([edge[0].min(edge[1]), edge[0].max(edge[1])]).or_insert(0) += if edge[0] < edge[1] { 1 } else { -1 };
+                    *edges.entry([edge[0].min(edge[1]), edge[0].max(edge[1])]).or_insert(0) +=
+                        if edge[0] < edge[1] { 1 } else { -1 };
                 }
             }
             assert!(edges.values().all(|balance| *balance == 0));

@@ -35,7 +35,8 @@ pub enum RayKind {
 
 impl RayKind {
     /// Every kind.
-    pub const ALL: [Self; 5] = [Self::Camera, Self::Shadow, Self::FirstBounce, Self::DeepBounce, Self::AmbientOcclusion];
+    pub const ALL: [Self; 5] =
+        [Self::Camera, Self::Shadow, Self::FirstBounce, Self::DeepBounce, Self::AmbientOcclusion];
 
     /// For people.
     pub fn name(self) -> &'static str {
@@ -89,7 +90,10 @@ pub fn record(scene: &Scene, accel: &dyn Accelerator, settings: &Settings, count
     settings.integrator = IntegratorDesc::AmbientOcclusion { distance: None };
     let occlusion = render_recorded(scene, accel, &settings)?;
     found.extend(
-        occlusion.into_iter().filter(|set| set.kind == RayKind::Shadow).map(|set| RaySet { kind: RayKind::AmbientOcclusion, ..set }),
+        occlusion
+            .into_iter()
+            .filter(|set| set.kind == RayKind::Shadow)
+            .map(|set| RaySet { kind: RayKind::AmbientOcclusion, ..set }),
     );
     found.retain(|set| !set.rays.is_empty());
     for set in &mut found {

@@ -141,7 +141,10 @@ macro_rules! naive {
     ($new:expr) => {{
         let build: Build = Box::new(|geometry| {
             let counter = $new(geometry);
-            Ok(Subject { accel: Box::new($new(geometry)), tests: Box::new(move |_, ray| Some(counter.tests(ray) as f64)) })
+            Ok(Subject {
+                accel: Box::new($new(geometry)),
+                tests: Box::new(move |_, ray| Some(counter.tests(ray) as f64)),
+            })
         });
         build
     }};
@@ -158,33 +161,39 @@ fn octree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
         Entry("octree", None, false, ours(AccelKind::Octree)),
         Entry("embree", Some("0.5 s"), false, ours(AccelKind::EMBREE)),
     ];
-    let mut comparison = compare("A head of 968 triangles: linear, octree, Embree", &head(968), &entries, options, watch)?;
-    comparison.claim = "120 s linear, 3.5 s octree, 0.5 s Embree, at 1200x800 with one sample a pixel and one thread (ratios 240 : 7 : 1).";
+    let mut comparison =
+        compare("A head of 968 triangles: linear, octree, Embree", &head(968), &entries, options, watch)?;
+    comparison.claim = "120 s linear, 3.5 s octree, 0.5 s Embree, at 1200x800 with one sample a pixel and one thread \
+                        (ratios 240 : 7 : 1).";
     comparison.sources = vec![
         "Stated by the report: the three times.".into(),
-        "From the exercise's public files (github.com/NJUCG/Moer-lite, examples/lab1-test/lab1-test-octree): 1200x800 pixels, one sample a pixel, \
-         normals, one thread; the head's mesh has 468 quads and 32 triangles, which are 968 triangles."
+        "From the exercise's public files (github.com/NJUCG/Moer-lite, examples/lab1-test/lab1-test-octree): 1200x800 \
+         pixels, one sample a pixel, normals, one thread; the head's mesh has 468 quads and 32 triangles, which are \
+         968 triangles."
             .into(),
         "Inferred: that the report timed this scene. The head here is generated, with as many triangles.".into(),
     ];
     if let [matrices, linear, naive, ours, embree] = &comparison.rows[..] {
         comparison.reasons = vec![
             format!(
-                "The report's linear loop multiplies three 4x4 matrices for each corner of each triangle in every test, and is {:.1} times slower \
-                 than a loop over corners that are in place; so much of its ratio to anything is the loop's.",
+                "The report's linear loop multiplies three 4x4 matrices for each corner of each triangle in every \
+                 test, and is {:.1} times slower than a loop over corners that are in place; so much of its ratio to \
+                 anything is the loop's.",
                 matrices.normals.accel_seconds / linear.normals.accel_seconds
             ),
             format!(
-                "Embree takes {:.3} s of a frame of {:.3} s here: rays of a packet share their visits, and the background ends at the root. In the \
-                 report's 0.5 s nearly everything is the rest of the frame (sampling, shading, the picture), so \"240 times\" is no measure of \
-                 Embree, which is {:.0} times faster than that loop.",
+                "Embree takes {:.3} s of a frame of {:.3} s here: rays of a packet share their visits, and the \
+                 background ends at the root. In the report's 0.5 s nearly everything is the rest of the frame \
+                 (sampling, shading, the picture), so \"240 times\" is no measure of Embree, which is {:.0} times \
+                 faster than that loop.",
                 embree.normals.accel_seconds,
                 embree.normals.frame_seconds[0],
                 matrices.normals.accel_seconds / embree.normals.accel_seconds
             ),
             format!(
-                "The report's octree is {:.1} times slower than Steradian's: cells of up to 64 triangles by their boxes in place of exact overlap \
-                 ({:.1} against {:.1} triangles tested per ray), a queue without order, no end at the first hit.",
+                "The report's octree is {:.1} times slower than Steradian's: cells of up to 64 triangles by their \
+                 boxes in place of exact overlap ({:.1} against {:.1} triangles tested per ray), a queue without order, \
+                 no end at the first hit.",
                 naive.normals.accel_seconds / ours.normals.accel_seconds,
                 naive.tests_per_ray.unwrap_or(f64::NAN),
                 ours.tests_per_ray.unwrap_or(f64::NAN),
@@ -206,20 +215,22 @@ fn kd_tree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
     comparison.claim = "A kd-tree is \"about 10 times\" faster than the linear loop on a mesh of 1,000 triangles.";
     comparison.sources = vec![
         "Stated by the report: \"about 10 times\", on a mesh named after 1,000 triangles.".into(),
-        "Inferred: 1200x800 pixels of normals, as in the first comparison; the report names neither size nor rays. The mesh here is generated.".into(),
+        "Inferred: 1200x800 pixels of normals, as in the first comparison; the report names neither size nor rays. The \
+         mesh here is generated.".into(),
     ];
     if let [linear, naive, _, ours, _] = &comparison.rows[..] {
         comparison.reasons = vec![
             format!(
-                "The report's tree (axes in turn, median of lower bounds, both children visited even after a near hit) is {:.0} times faster \
-                 than the linear loop within the accelerator, Steradian's {:.0} times; they test {:.1} and {:.1} triangles per ray.",
+                "The report's tree (axes in turn, median of lower bounds, both children visited even after a near hit) \
+                 is {:.0} times faster than the linear loop within the accelerator, Steradian's {:.0} times; they test \
+                 {:.1} and {:.1} triangles per ray.",
                 linear.normals.accel_seconds / naive.normals.accel_seconds,
                 linear.normals.accel_seconds / ours.normals.accel_seconds,
                 naive.tests_per_ray.unwrap_or(f64::NAN),
                 ours.tests_per_ray.unwrap_or(f64::NAN),
             ),
-            "The ratio grows with the mesh: linear cost is proportional to the number of triangles, a tree's to its logarithm. One number for \
-             1,000 triangles says little of 100,000."
+            "The ratio grows with the mesh: linear cost is proportional to the number of triangles, a tree's to its \
+             logarithm. One number for 1,000 triangles says little of 100,000."
                 .into(),
         ];
     }
@@ -229,7 +240,12 @@ fn kd_tree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
 fn bvh(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
     let entries = [
         Entry("linear", Some("1"), true, ours(AccelKind::Linear)),
-        Entry("BVH as in the report, wrong leaves", Some("17.61 times faster"), true, naive!(NaiveBvh::with_wrong_leaves)),
+        Entry(
+            "BVH as in the report, wrong leaves",
+            Some("17.61 times faster"),
+            true,
+            naive!(NaiveBvh::with_wrong_leaves),
+        ),
         Entry("BVH as in the report, right leaves", None, false, naive!(NaiveBvh::new)),
         Entry("bvh:binary", None, false, ours(AccelKind::Bvh(accel::BvhOptions { binary: true }))),
         Entry("bvh", None, false, ours(AccelKind::Bvh(accel::BvhOptions::default()))),
@@ -238,27 +254,35 @@ fn bvh(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
     let mut comparison = compare("70,000 triangles: linear, BVH", &bumpy_sphere(70_000), &entries, options, watch)?;
     comparison.claim = "A BVH is \"17.61 times\" faster than the linear loop on 70,580 triangles.";
     comparison.sources = vec![
-        "Stated by the report: 14 h 28 min 22 s with 16 samples a pixel, 9 h 51 min 48 s with 192, path traced; per sample the ratio is 17.61.".into(),
-        "From the report's source: a mesh of 70,580 triangles in a box. The mesh here is generated, 70,000 triangles.".into(),
-        "Inferred: 1200x800 pixels, as in the first comparison; the report names no size, and a ratio per sample does not depend on it.".into(),
+        "Stated by the report: 14 h 28 min 22 s with 16 samples a pixel, 9 h 51 min 48 s with 192, path traced; per \
+         sample the ratio is 17.61."
+            .into(),
+        "From the report's source: a mesh of 70,580 triangles in a box. The mesh here is generated, 70,000 triangles."
+            .into(),
+        "Inferred: 1200x800 pixels, as in the first comparison; the report names no size, and a ratio per sample does \
+         not depend on it."
+            .into(),
     ];
     if let [linear, wrong, right, _, ours, _] = &comparison.rows[..] {
         let tests = |row: &ComparisonRow| row.tests_per_ray.unwrap_or(f64::NAN);
         comparison.reasons = vec![
             format!(
-                "The report's leaves exchange first and count, so a leaf of n triangles from place i tests i triangles from place n on: {:.0} \
-                 tests per ray where its tree with right leaves needs {:.1} and the linear loop {:.0}. That alone gives {:.1} times.",
+                "The report's leaves exchange first and count, so a leaf of n triangles from place i tests i triangles \
+                 from place n on: {:.0} tests per ray where its tree with right leaves needs {:.1} and the linear loop \
+                 {:.0}. That alone gives {:.1} times.",
                 tests(wrong),
                 tests(right),
                 tests(linear),
                 linear.normals.accel_seconds / wrong.normals.accel_seconds,
             ),
-            "The rest of 17.61 is threads: both runs divided the samples of a pixel among threads four at a time, 16 samples for the linear \
-             loop (4 threads busy) and 192 for the BVH (up to 48), and the ratio was taken per sample."
+            "The rest of 17.61 is threads: both runs divided the samples of a pixel among threads four at a time, 16 \
+             samples for the linear loop (4 threads busy) and 192 for the BVH (up to 48), and the ratio was taken per \
+             sample."
                 .into(),
             format!(
-                "With right leaves the same tree is {:.0} times faster than the linear loop within the accelerator, and Steradian's {:.0} times; on \
-                 path-traced frames, which the report's were, {:.0} and {:.0} times, and the wrong leaves {:.1} times.",
+                "With right leaves the same tree is {:.0} times faster than the linear loop within the accelerator, \
+                 and Steradian's {:.0} times; on path-traced frames, which the report's were, {:.0} and {:.0} times, \
+                 and the wrong leaves {:.1} times.",
                 linear.normals.accel_seconds / right.normals.accel_seconds,
                 linear.normals.accel_seconds / ours.normals.accel_seconds,
                 linear.paths.accel_seconds / right.paths.accel_seconds,
@@ -270,19 +294,27 @@ fn bvh(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
     Ok(comparison)
 }
 
-fn compare(title: &'static str, mesh: &Mesh, entries: &[Entry], options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
+fn compare(
+    title: &'static str,
+    mesh: &Mesh,
+    entries: &[Entry],
+    options: &ReportsOptions,
+    watch: &dyn Watch,
+) -> Result<Comparison> {
     let triangles = mesh.triangles().len();
     let benchmark = FrameBenchmark { title, mesh, entries, options, watch };
     let [normals, paths] = [Kind::Normals, Kind::Paths].map(|kind| measure(benchmark, kind));
     let (normals, paths) = (normals?, paths?);
-    let rows = entries.iter().zip(normals).zip(paths).map(|((Entry(name, reported, ..), of_normals), of_paths)| ComparisonRow {
-        name: (*name).to_owned(),
-        reported: *reported,
-        build_milliseconds: of_normals.build_milliseconds,
-        normals: of_normals.timing,
-        paths: of_paths.timing,
-        tests_per_ray: of_normals.tests_per_ray,
-        different_pixels: of_normals.different_pixels,
+    let rows = entries.iter().zip(normals).zip(paths).map(|((Entry(name, reported, ..), of_normals), of_paths)| {
+        ComparisonRow {
+            name: (*name).to_owned(),
+            reported: *reported,
+            build_milliseconds: of_normals.build_milliseconds,
+            normals: of_normals.timing,
+            paths: of_paths.timing,
+            tests_per_ray: of_normals.tests_per_ray,
+            different_pixels: of_normals.different_pixels,
+        }
     });
     Ok(Comparison { title, triangles, claim: "", sources: Vec::new(), rows: rows.collect(), reasons: Vec::new() })
 }
@@ -300,16 +332,23 @@ mod tests {
         for comparison in &report.comparisons {
             let linear = comparison.rows[0].tests_per_ray.unwrap();
             assert_eq!(linear, comparison.triangles as f64);
-            assert!(comparison.rows.len() >= 5 && !comparison.claim.is_empty() && comparison.reasons.len() >= 2, "{comparison:?}");
+            assert!(
+                comparison.rows.len() >= 5 && !comparison.claim.is_empty() && comparison.reasons.len() >= 2,
+                "{comparison:?}"
+            );
             assert!(comparison.sources.iter().any(|source| source.starts_with("Inferred")), "{comparison:?}");
             for row in &comparison.rows {
                 // The wrong leaves of the report lose one leaf; Embree rounds otherwise at edges.
                 let allowed = if row.name.contains("wrong") || row.name == "embree" { 12 } else { 0 };
                 assert!(row.different_pixels <= allowed, "{row:?}");
-                let is_tree = row.normals.scaled_from.is_none() && !row.name.starts_with("linear") && !row.name.contains("wrong");
+                let is_tree =
+                    row.normals.scaled_from.is_none() && !row.name.starts_with("linear") && !row.name.contains("wrong");
                 assert!(!is_tree || row.tests_per_ray.is_none_or(|tests| tests < 0.1 * linear), "{row:?}");
                 let timings = [row.normals, row.paths];
-                assert!(timings.iter().all(|t| t.accel_seconds > 0.0 && t.frame_seconds[1] >= t.accel_seconds), "{row:?}");
+                assert!(
+                    timings.iter().all(|t| t.accel_seconds > 0.0 && t.frame_seconds[1] >= t.accel_seconds),
+                    "{row:?}"
+                );
             }
         }
         let folder = tempfile::tempdir().unwrap();
@@ -317,7 +356,11 @@ mod tests {
         let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
         let (page, text) = (read("reports.html"), read("reports.md"));
         assert_eq!((page.matches("<svg").count(), page.matches("<table>").count()), (3, 3));
-        assert!([&page, &text].iter().all(|text| text.contains("Inferred: 1200x800") && text.contains("path traced: frame s")));
+        assert!(
+            [&page, &text]
+                .iter()
+                .all(|text| text.contains("Inferred: 1200x800") && text.contains("path traced: frame s"))
+        );
         assert!(serde_json::from_str::<serde_json::Value>(&read("reports.json")).is_ok());
     }
 }

@@ -66,7 +66,8 @@ pub fn bench_scaling(first: usize, last: usize, options: &Options, watch: &dyn W
         let geometry = sphere_geometry(triangles);
         let count = geometry.shapes[0].prim_count();
         for &kind in &options.accels {
-            let affordable = if kind == AccelKind::Linear { (options.linear_tests as usize / count).min(RAYS) } else { RAYS };
+            let affordable =
+                if kind == AccelKind::Linear { (options.linear_tests as usize / count).min(RAYS) } else { RAYS };
             if watch.is_stopped() || affordable < 16 {
                 continue;
             }
@@ -93,7 +94,8 @@ pub fn bench_scaling(first: usize, last: usize, options: &Options, watch: &dyn W
         triangles *= 10;
     }
     let slope = |name: &str, cost: fn(&ScalingPoint) -> f64| {
-        let of_accel: Vec<_> = points.iter().filter(|p| p.accel == name).map(|p| (p.triangles as f64, cost(p))).collect();
+        let of_accel: Vec<_> =
+            points.iter().filter(|p| p.accel == name).map(|p| (p.triangles as f64, cost(p))).collect();
         fitted_slope(&of_accel)
     };
     let names: Vec<String> = options.accels.iter().map(ToString::to_string).collect();

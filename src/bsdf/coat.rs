@@ -58,7 +58,12 @@ impl Coat<Ggx> {
 impl<D: Microfacets> Coat<D> {
     /// A coat of which nothing but the index of refraction counts.
     fn smooth(ior: f32, facets: D) -> Self {
-        Self { ior, facets, internal: internal_reflectance(ior, fresnel::dielectric_average(ior)), reflected: [0; NODES] }
+        Self {
+            ior,
+            facets,
+            internal: internal_reflectance(ior, fresnel::dielectric_average(ior)),
+            reflected: [0; NODES],
+        }
     }
 
     /// A coat that loses the light that its microfacets scatter several times, whatever side it comes from. `mean` is
@@ -192,7 +197,8 @@ impl<D: Microfacets> Coat<D> {
         let at = cos.sqrt() * last as f32;
         let node = (at as i32).clamp(0, last as i32 - 1) as usize;
         let part = (at - node as f32).min(1.0);
-        let (before, after) = (f32::from(self.reflected[node * AXES + axis]), f32::from(self.reflected[(node + 1) * AXES + axis]));
+        let (before, after) =
+            (f32::from(self.reflected[node * AXES + axis]), f32::from(self.reflected[(node + 1) * AXES + axis]));
         (before + (after - before) * part) * (1.0 / 65_535.0)
     }
 
@@ -254,7 +260,10 @@ pub(super) fn first_encounter(eta: f32, facets: &impl Microfacets, o: Vec3) -> F
             transmitted += (1.0 - refraction.reflectance) * facets.g2_over_g1(o, vec3(down.x, down.y, -down.z));
         }
     }
-    FirstEncounter { reflected: (reflected / POINTS as f32).clamp(0.0, 1.0), transmitted: (transmitted / POINTS as f32).clamp(0.0, 1.0) }
+    FirstEncounter {
+        reflected: (reflected / POINTS as f32).clamp(0.0, 1.0),
+        transmitted: (transmitted / POINTS as f32).clamp(0.0, 1.0),
+    }
 }
 
 /// The mean of a function of the cosine under diffuse light, by the midpoint rule in the cosine.

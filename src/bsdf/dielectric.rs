@@ -82,7 +82,11 @@ impl Dielectric<Ggx> {
     /// would hardly show its roughness.
     pub fn new(ior: f32, alpha: [f32; 2]) -> Self {
         let ggx = Ggx::new(clamp_alpha_for_ior(ior, alpha));
-        if ggx.is_smooth() { Self { ior, facets: ggx, multiple: None, tints: CLEAR } } else { Self::rough(ior, ggx, true) }
+        if ggx.is_smooth() {
+            Self { ior, facets: ggx, multiple: None, tints: CLEAR }
+        } else {
+            Self::rough(ior, ggx, true)
+        }
     }
 
     /// A boundary of which the caller knows that it is rough.

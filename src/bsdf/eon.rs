@@ -117,7 +117,8 @@ impl Eon {
         let s = o.x * i.x + o.y * i.y;
         let facing = if s > 0.0 { s / o.z.max(i.z) } else { s };
         let once = (1.0 + self.roughness * facing) / (1.0 + ENERGY * self.roughness);
-        let missing_energy = (1.0 - self.single_albedo(o.z)) * (1.0 - self.single_albedo(i.z)) / (1.0 - self.average_albedo()).max(1e-7);
+        let missing_energy =
+            (1.0 - self.single_albedo(o.z)) * (1.0 - self.single_albedo(i.z)) / (1.0 - self.average_albedo()).max(1e-7);
         let value = (self.albedo * once + self.multiple() * missing_energy) * (FRAC_1_PI * i.z);
         let uniform = self.uniform_probability(o.z.min(1.0));
         let pdf = uniform * 0.5 * FRAC_1_PI + (1.0 - uniform) * Transformed::new(o, self.roughness).pdf(i);

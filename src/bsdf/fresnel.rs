@@ -50,7 +50,8 @@ fn average_from_outside(eta: f64) -> f64 {
         let s = (cos - eta * cos_t) / (cos + eta * cos_t);
         0.5 * (p * p + s * s)
     };
-    (0..STEPS).map(|i| (f64::from(i) + 0.5) / f64::from(STEPS)).map(|cos| 2.0 * cos * reflectance(cos)).sum::<f64>() / f64::from(STEPS)
+    (0..STEPS).map(|i| (f64::from(i) + 0.5) / f64::from(STEPS)).map(|cos| 2.0 * cos * reflectance(cos)).sum::<f64>()
+        / f64::from(STEPS)
 }
 
 /// A conductor's index of refraction, `eta + i k`, in the form that [`ComplexIndex::reflectance`] needs: one channel.
@@ -112,7 +113,9 @@ mod tests {
                 } else if sin2_t < 1.0 - 1e-3 {
                     assert!((f64::from(refraction.cos_t) - (1.0 - sin2_t).sqrt()).abs() < 1e-5);
                     // Reversing the path changes nothing but the rounding, which the steep ends amplify.
-                    assert!((dielectric(refraction.cos_t, 1.0 / eta).reflectance - refraction.reflectance).abs() < 1e-3);
+                    assert!(
+                        (dielectric(refraction.cos_t, 1.0 / eta).reflectance - refraction.reflectance).abs() < 1e-3
+                    );
                 }
                 assert!((0.0..=1.0).contains(&refraction.reflectance));
             }

@@ -40,7 +40,14 @@ impl Lambert {
     #[inline(always)]
     pub fn sample(&self, wo: Vec3, _u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
         let DiffuseDirection { wi, pdf, is_valid } = self.direction(wo, u);
-        is_valid.then_some(BsdfSample { wi, weight: self.albedo, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
+        is_valid.then_some(BsdfSample {
+            wi,
+            weight: self.albedo,
+            pdf,
+            is_delta: false,
+            is_transmission: false,
+            eta: 1.0,
+        })
     }
 
     /// What [`sample`](Self::sample) chooses, without branches.

@@ -43,6 +43,13 @@ impl BsdfSample {
     /// Delta reflection, chosen with the given probability.
     #[inline(always)]
     pub(super) fn mirrored(wo: Vec3, weight: Rgb, probability: f32) -> Self {
-        Self { wi: vec3(-wo.x, -wo.y, wo.z), weight, pdf: probability, is_delta: true, is_transmission: false, eta: 1.0 }
+        Self {
+            wi: vec3(-wo.x, -wo.y, wo.z),
+            weight,
+            pdf: probability,
+            is_delta: true,
+            is_transmission: false,
+            eta: 1.0,
+        }
     }
 }

@@ -84,7 +84,14 @@ impl BsdfEval {
     #[inline(always)]
     fn sampled(self, wi: Vec3) -> Option<BsdfSample> {
         let Self { value, pdf } = self;
-        (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
+        (pdf > 0.0).then(|| BsdfSample {
+            wi,
+            weight: value / pdf,
+            pdf,
+            is_delta: false,
+            is_transmission: false,
+            eta: 1.0,
+        })
     }
 }
 

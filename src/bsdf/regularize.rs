@@ -11,15 +11,21 @@ impl Bsdf {
         Some(match self {
             Self::Conductor(bsdf) => Self::Conductor(bsdf.with_alpha(widened(bsdf.alpha(), alpha)?)),
             Self::Dielectric(bsdf) => Self::Dielectric(bsdf.with_alpha(widened(bsdf.alpha(), alpha)?)),
-            Self::Plastic(bsdf) => {
-                Self::Plastic(super::Plastic { coat: bsdf.coat.with_alpha(widened(bsdf.coat.alpha(), alpha)?), ..*bsdf })
-            }
+            Self::Plastic(bsdf) => Self::Plastic(super::Plastic {
+                coat: bsdf.coat.with_alpha(widened(bsdf.coat.alpha(), alpha)?),
+                ..*bsdf
+            }),
             Self::Principled(bsdf) => Self::Principled(bsdf.with_alpha(widened(bsdf.alpha(), alpha)?)),
             Self::Glossy(bsdf) => Self::Glossy(bsdf.with_alpha(widened(bsdf.alpha(), alpha)?)),
             Self::Coated(bsdf) => Self::Coated(Coated::with_min_alpha(bsdf, alpha)?.into()),
             Self::Beckmann(bsdf) => Self::Beckmann(bsdf.with_min_alpha(alpha)?),
             Self::SeparableGgx(bsdf) => Self::SeparableGgx(bsdf.with_min_alpha(alpha)?),
-            Self::Lambert(_) | Self::Eon(_) | Self::DiffuseTransmission(_) | Self::Mirror(_) | Self::ThinDielectric(_) | Self::Phong(_) => {
+            Self::Lambert(_)
+            | Self::Eon(_)
+            | Self::DiffuseTransmission(_)
+            | Self::Mirror(_)
+            | Self::ThinDielectric(_)
+            | Self::Phong(_) => {
                 return None;
             }
         })
@@ -30,10 +36,13 @@ impl<D: Microfacets> SingleScatteringBsdf<D> {
     fn with_min_alpha(&self, alpha: f32) -> Option<Self> {
         Some(match self {
             Self::Conductor(bsdf) => Self::Conductor(bsdf.with_single_scattering_alpha(widened(bsdf.alpha(), alpha)?)),
-            Self::Dielectric(bsdf) => Self::Dielectric(bsdf.with_single_scattering_alpha(widened(bsdf.alpha(), alpha)?)),
-            Self::Plastic(bsdf) => {
-                Self::Plastic(super::Plastic { coat: bsdf.coat.with_alpha(widened(bsdf.coat.alpha(), alpha)?), ..*bsdf })
+            Self::Dielectric(bsdf) => {
+                Self::Dielectric(bsdf.with_single_scattering_alpha(widened(bsdf.alpha(), alpha)?))
             }
+            Self::Plastic(bsdf) => Self::Plastic(super::Plastic {
+                coat: bsdf.coat.with_alpha(widened(bsdf.coat.alpha(), alpha)?),
+                ..*bsdf
+            }),
         })
     }
 }

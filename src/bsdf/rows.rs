@@ -82,8 +82,14 @@ impl BsdfEvalRows {
 impl BsdfSampleRows {
     #[inline(always)]
     fn set(&mut self, i: usize, sample: Option<BsdfSample>) {
-        const NONE: BsdfSample =
-            BsdfSample { wi: Vec3::ZERO, weight: Rgb::BLACK, pdf: 0.0, is_delta: false, is_transmission: false, eta: 1.0 };
+        const NONE: BsdfSample = BsdfSample {
+            wi: Vec3::ZERO,
+            weight: Rgb::BLACK,
+            pdf: 0.0,
+            is_delta: false,
+            is_transmission: false,
+            eta: 1.0,
+        };
         self.is_valid[i] = u32::from(sample.is_some());
         let BsdfSample { wi, weight, pdf, is_delta, is_transmission, eta } = sample.unwrap_or(NONE);
         self.wi.set(i, wi);
@@ -188,7 +194,9 @@ macro_rules! lanes {
             };
         }
         match $bsdf {
-            Bsdf::Principled(bsdf) if bsdf.is_basic() && bsdf.is_mitsuba() => with_principled!(bsdf, Principled::basic::<true>),
+            Bsdf::Principled(bsdf) if bsdf.is_basic() && bsdf.is_mitsuba() => {
+                with_principled!(bsdf, Principled::basic::<true>)
+            }
             Bsdf::Principled(bsdf) if bsdf.is_basic() => with_principled!(bsdf, Principled::basic::<false>),
             Bsdf::Conductor(bsdf) => match bsdf.scattering() {
                 Scattering::Single => with!(Uniform(Metal(bsdf))),
@@ -202,14 +210,18 @@ macro_rules! lanes {
             },
             Bsdf::Plastic(bsdf) if bsdf.coat.is_smooth() => with_plastic!(bsdf, SmoothPlastic),
             Bsdf::Plastic(bsdf) if !bsdf.flags().is_anisotropic() => with_plastic!(bsdf, IsotropicPlastic),
-            Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(bsdf)) if bsdf.coat.is_smooth() => with_plastic!(bsdf, SmoothPlastic),
+            Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(bsdf)) if bsdf.coat.is_smooth() => {
+                with_plastic!(bsdf, SmoothPlastic)
+            }
             Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(bsdf)) if !bsdf.flags().is_anisotropic() => {
                 with_plastic!(bsdf, IsotropicPlastic)
             }
             Bsdf::SeparableGgx(SingleScatteringBsdf::Conductor(bsdf)) if bsdf.scattering() == Scattering::Single => {
                 with!(Uniform(Metal(bsdf)))
             }
-            Bsdf::SeparableGgx(SingleScatteringBsdf::Dielectric(bsdf)) if !bsdf.flags().is_delta() => with!(Uniform(Glass(bsdf))),
+            Bsdf::SeparableGgx(SingleScatteringBsdf::Dielectric(bsdf)) if !bsdf.flags().is_delta() => {
+                with!(Uniform(Glass(bsdf)))
+            }
             _ => $otherwise,
         }
     }};
@@ -221,7 +233,9 @@ impl Bsdf {
     pub fn can_vary(&self) -> bool {
         match self {
             Self::Plastic(bsdf) => bsdf.coat.is_smooth() || !bsdf.coat.is_anisotropic(),
-            Self::SeparableGgx(SingleScatteringBsdf::Plastic(bsdf)) => bsdf.coat.is_smooth() || !bsdf.coat.is_anisotropic(),
+            Self::SeparableGgx(SingleScatteringBsdf::Plastic(bsdf)) => {
+                bsdf.coat.is_smooth() || !bsdf.coat.is_anisotropic()
+            }
             Self::Principled(bsdf) => bsdf.is_basic(),
             _ => false,
         }

@@ -49,7 +49,14 @@ impl ThinDielectric {
             return Some(BsdfSample::mirrored(wo, self.reflection_tint, reflectance));
         }
         let pdf = 1.0 - reflectance;
-        Some(BsdfSample { wi: -wo, weight: self.transmission_tint, pdf, is_delta: true, is_transmission: true, eta: 1.0 })
+        Some(BsdfSample {
+            wi: -wo,
+            weight: self.transmission_tint,
+            pdf,
+            is_delta: true,
+            is_transmission: true,
+            eta: 1.0,
+        })
     }
 
     /// The lobes.
@@ -113,7 +120,8 @@ impl DiffuseTransmission {
         }
         let reflection = self.reflection_probability();
         let is_transmission = u_lobe >= reflection;
-        let (color, probability) = if is_transmission { (self.transmittance, 1.0 - reflection) } else { (self.reflectance, reflection) };
+        let (color, probability) =
+            if is_transmission { (self.transmittance, 1.0 - reflection) } else { (self.reflectance, reflection) };
         let z = i.z.copysign(if is_transmission { -wo.z } else { wo.z });
         let pdf = probability * FRAC_1_PI * i.z;
         (pdf > 0.0).then(|| BsdfSample {

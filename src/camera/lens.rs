@@ -101,7 +101,8 @@ mod tests {
             let mut near_corner = vec![0; count as usize];
             let grid = 256;
             for i in 0..grid * grid {
-                let p = lens.sample([((i % grid) as f32 + 0.5) / grid as f32, ((i / grid) as f32 + 0.5) / grid as f32]) / lens.radius;
+                let p = lens.sample([((i % grid) as f32 + 0.5) / grid as f32, ((i / grid) as f32 + 0.5) / grid as f32])
+                    / lens.radius;
                 for k in 0..count {
                     let toward_side = DVec2::from_angle(blades.rotation + side * (f64::from(k) + 0.5));
                     assert!(p.dot(toward_side) <= inner + 1e-6);

@@ -95,16 +95,25 @@ mod tests {
     fn rays_end_where_the_picture_shows_them() {
         let size = [64, 36];
         let framing = Framing { pixel_aspect: 1.3, shift: [0.1, -0.2] };
-        for projection in [Projection::Perspective { half_height: 0.4, lens: None }, Projection::Orthographic { half_height: 2.5 }] {
+        for projection in
+            [Projection::Perspective { half_height: 0.4, lens: None }, Projection::Orthographic { half_height: 2.5 }]
+        {
             let camera = Camera::new(Transform::new(place()).unwrap(), projection).with_framing(framing);
             let matrix = camera.world_to_ndc(size).unwrap();
             let mut last = f64::NEG_INFINITY;
-            for (film, distance) in [(Vec2::new(0.0, 0.0), 1.5), (Vec2::new(60.5, 10.25), 3.0), (Vec2::new(32.0, 36.0), 9.0)] {
+            for (film, distance) in
+                [(Vec2::new(0.0, 0.0), 1.5), (Vec2::new(60.5, 10.25), 3.0), (Vec2::new(32.0, 36.0), 9.0)]
+            {
                 let ray = camera.ray(film, size, [0.5; 2], 0.0);
                 let p = ray.origin.as_dvec3() + ray.direction.as_dvec3() * distance;
                 let [x, y, z, w] = mapped(p, matrix);
                 let expected = [f64::from(film.x) / 64.0, f64::from(film.y) / 36.0];
-                assert!((x / w - expected[0]).abs() < 1e-5 && (y / w - expected[1]).abs() < 1e-5, "{} {} {expected:?}", x / w, y / w);
+                assert!(
+                    (x / w - expected[0]).abs() < 1e-5 && (y / w - expected[1]).abs() < 1e-5,
+                    "{} {} {expected:?}",
+                    x / w,
+                    y / w
+                );
                 assert!(z / w > last);
                 last = z / w;
             }

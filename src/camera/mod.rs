@@ -116,7 +116,11 @@ impl Camera {
         let projection = match self.projection {
             Projection::Perspective { half_height, lens } => Projection::Perspective {
                 half_height,
-                lens: lens.map(|lens| Lens { radius: lens.radius * scale, focus_distance: lens.focus_distance * scale, ..lens }),
+                lens: lens.map(|lens| Lens {
+                    radius: lens.radius * scale,
+                    focus_distance: lens.focus_distance * scale,
+                    ..lens
+                }),
             },
             Projection::Orthographic { half_height } => Projection::Orthographic { half_height: half_height * scale },
             Projection::Environment => Projection::Environment,
@@ -203,7 +207,9 @@ impl Camera {
                     }
                 }
             }
-            Projection::Orthographic { half_height } => (self.on_picture(film, size, *half_height) + DVec3::Z, -DVec3::Z),
+            Projection::Orthographic { half_height } => {
+                (self.on_picture(film, size, *half_height) + DVec3::Z, -DVec3::Z)
+            }
             Projection::Environment => (DVec3::ZERO, everywhere(film, size)),
         };
         if self.near > 0.0 {

@@ -59,7 +59,9 @@ impl Camera {
     fn film_of(&self, local: DVec3, size: [u32; 2]) -> Option<DVec2> {
         let (width, height) = (f64::from(size[0]), f64::from(size[1]));
         let (x, y, half_height) = match self.projection {
-            Projection::Perspective { half_height, .. } if local.z < 0.0 => (local.x / -local.z, local.y / -local.z, half_height),
+            Projection::Perspective { half_height, .. } if local.z < 0.0 => {
+                (local.x / -local.z, local.y / -local.z, half_height)
+            }
             Projection::Orthographic { half_height } if local.z < 0.0 => (local.x, local.y, half_height),
             Projection::Perspective { .. } | Projection::Orthographic { .. } => return None,
             Projection::Environment => {
@@ -70,7 +72,10 @@ impl Camera {
         };
         let scale = 2.0 * half_height / height;
         let [right, up] = self.framing.shift;
-        Some(DVec2::new(x / (scale * self.framing.pixel_aspect) + (0.5 - right) * width, (0.5 + up) * height - y / scale))
+        Some(DVec2::new(
+            x / (scale * self.framing.pixel_aspect) + (0.5 - right) * width,
+            (0.5 + up) * height - y / scale,
+        ))
     }
 }
 
@@ -83,7 +88,8 @@ mod tests {
     const SIZE: [u32; 2] = [300, 200];
 
     fn cameras() -> Vec<Camera> {
-        let place = DAffine3::from_rotation_translation(crate::math::DQuat::from_rotation_y(0.7), DVec3::new(1.0, 2.0, 3.0));
+        let place =
+            DAffine3::from_rotation_translation(crate::math::DQuat::from_rotation_y(0.7), DVec3::new(1.0, 2.0, 3.0));
         let later = DAffine3::from_translation(DVec3::new(0.5, -0.25, 0.1)) * place * DAffine3::from_rotation_x(0.2);
         let framing = Framing { pixel_aspect: 1.5, shift: [0.2, -0.1] };
         let projections = [
@@ -95,7 +101,8 @@ mod tests {
         projections
             .into_iter()
             .flat_map(|projection| {
-                let still = Camera::new(Transform::new(place).unwrap(), projection).with_framing(framing).with_near(0.2);
+                let still =
+                    Camera::new(Transform::new(place).unwrap(), projection).with_framing(framing).with_near(0.2);
                 [still.clone(), still.with_motion(moving.clone()).unwrap()]
             })
             .collect()
@@ -117,7 +124,10 @@ mod tests {
             }
         }
         let behind = DVec3::new(1.0, 2.0, 3.0) - cameras()[0].axis().as_dvec3();
-        assert!(cameras()[0].film_point(behind, SIZE, 0.0).is_none() && cameras()[2].film_point(behind, SIZE, 0.0).is_none());
+        assert!(
+            cameras()[0].film_point(behind, SIZE, 0.0).is_none()
+                && cameras()[2].film_point(behind, SIZE, 0.0).is_none()
+        );
         assert!(cameras()[4].film_point(behind, SIZE, 0.0).is_some());
     }
 
@@ -141,7 +151,8 @@ mod tests {
         assert_eq!(camera.film_motion_at_infinity(-DVec3::Z, SIZE), Vec2::ZERO);
 
         // A camera that moves to the right sees what stands still go left, and what is far away stay.
-        let to_the_right = Motion::keyframed(&[(0.0, DAffine3::IDENTITY), (1.0, DAffine3::from_translation(0.1 * DVec3::X))]).unwrap();
+        let to_the_right =
+            Motion::keyframed(&[(0.0, DAffine3::IDENTITY), (1.0, DAffine3::from_translation(0.1 * DVec3::X))]).unwrap();
         let camera = camera.with_motion(to_the_right).unwrap();
         let moved = camera.film_motion([-DVec3::Z; 2], SIZE);
         assert!((moved - Vec2::new(-10.0, 0.0)).length() < 1e-4, "{moved}");
@@ -151,11 +162,16 @@ mod tests {
         let turn = Motion::keyframed(&[(0.0, DAffine3::IDENTITY), (1.0, DAffine3::from_rotation_y(0.1))]).unwrap();
         let turning = |projection| Camera::new(Transform::IDENTITY, projection).with_motion(turn.clone()).unwrap();
         let perspective = turning(Projection::Perspective { half_height: 1.0, lens: None });
-        for moved in [perspective.film_motion([-5.0 * DVec3::Z; 2], SIZE), perspective.film_motion_at_infinity(-DVec3::Z, SIZE)] {
+        for moved in
+            [perspective.film_motion([-5.0 * DVec3::Z; 2], SIZE), perspective.film_motion_at_infinity(-DVec3::Z, SIZE)]
+        {
             assert!((f64::from(moved.x) - 100.0 * 0.1f64.tan()).abs() < 1e-3 && moved.y.abs() < 1e-4, "{moved}");
         }
         // Around the seam of a picture of everything, the shorter way.
         let everything = turning(Projection::Environment).film_motion_at_infinity(DVec3::new(0.01, 0.0, 1.0), SIZE);
-        assert!((f64::from(everything.x) - 300.0 * 0.1 / TAU).abs() < 1e-3 && everything.y.abs() < 1e-4, "{everything}");
+        assert!(
+            (f64::from(everything.x) - 300.0 * 0.1 / TAU).abs() < 1e-3 && everything.y.abs() < 1e-4,
+            "{everything}"
+        );
     }
 }

@@ -68,7 +68,9 @@ fn the_environment_camera_sees_what_an_environment_light_shows() {
 
 #[test]
 fn pixels_twice_as_wide_show_twice_the_width() {
-    for projection in [Projection::Perspective { half_height: 1.0, lens: None }, Projection::Orthographic { half_height: 1.0 }] {
+    for projection in
+        [Projection::Perspective { half_height: 1.0, lens: None }, Projection::Orthographic { half_height: 1.0 }]
+    {
         let wide = placed(projection).with_framing(Framing { pixel_aspect: 2.0, ..Framing::default() });
         // A picture of half the pixels across shows the same.
         let a = wide.ray(Vec2::new(20.0, 30.0), [100, 100], [0.5; 2], 0.0);
@@ -79,7 +81,9 @@ fn pixels_twice_as_wide_show_twice_the_width() {
 
 #[test]
 fn a_shifted_picture_is_a_part_of_a_larger_one() {
-    for projection in [Projection::Perspective { half_height: 1.0, lens: None }, Projection::Orthographic { half_height: 1.0 }] {
+    for projection in
+        [Projection::Perspective { half_height: 1.0, lens: None }, Projection::Orthographic { half_height: 1.0 }]
+    {
         let shifted = placed(projection).with_framing(Framing { shift: [0.25, -0.5], ..Framing::default() });
         let a = shifted.ray(Vec2::new(20.0, 30.0), [200, 100], [0.5; 2], 0.0);
         let b = placed(projection).ray(Vec2::new(20.0 + 50.0, 30.0 + 50.0), [200, 100], [0.5; 2], 0.0);
@@ -136,7 +140,9 @@ fn a_camera_that_turns_looks_along_its_turned_axis_at_each_time() {
             let still = Camera::new(Transform::new(there).unwrap(), *moving.projection());
             let film = Vec2::new(30.0, 20.0);
             let (a, b) = (moving.ray(film, [200, 100], [0.2, 0.7], time), still.ray(film, [200, 100], [0.2, 0.7], 0.0));
-            assert!((a.origin - b.origin).length() < 1e-6 && (a.direction - b.direction).length() < 1e-6 && a.time == time);
+            assert!(
+                (a.origin - b.origin).length() < 1e-6 && (a.direction - b.direction).length() < 1e-6 && a.time == time
+            );
             let p = DVec3::new(0.5, -7.0, 2.0);
             assert!((moving.depth(p, time) - still.depth(p, 0.0)).abs() < 1e-5);
         }

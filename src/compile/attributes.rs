@@ -65,7 +65,9 @@ impl Builder {
         let given = given.unwrap_or(&mut nothing);
         for Taken { by, id, scale, largest } in &taken {
             let name = &names[id.index()];
-            let values = given.get(name).ok_or_else(|| refuse(format!("{by} takes the attribute \"{name}\": the shape has none")))?;
+            let values = given
+                .get(name)
+                .ok_or_else(|| refuse(format!("{by} takes the attribute \"{name}\": the shape has none")))?;
             let is_good = |value: &f32| (0.0..=*largest).contains(&(value * scale));
             if let Some(bad) = values.numbers().iter().position(|value| !is_good(value)) {
                 let i = bad / values.channels();
@@ -76,7 +78,9 @@ impl Builder {
                 let owner = if is_of_faces(name) == Some(true) { "triangle" } else { "vertex" };
                 let times = if *scale == 1.0 { String::new() } else { format!(" times {scale}") };
                 let range = if *largest == 1.0 { "within 0 and 1" } else { "finite and not below 0" };
-                return Err(refuse(format!("the attribute \"{name}\" of {owner} {i} is {value}{times}, but must be {range} for {by}")));
+                return Err(refuse(format!(
+                    "the attribute \"{name}\" of {owner} {i} is {value}{times}, but must be {range} for {by}"
+                )));
             }
         }
         given.retain(|name, _| taken.iter().any(|taken| names[taken.id.index()] == *name));
@@ -85,9 +89,14 @@ impl Builder {
 }
 
 /// Rejects attributes with more or fewer values than vertices or triangles.
-pub fn check_counts(attributes: &BTreeMap<String, AttributeValues>, vertices: usize, triangles: usize) -> std::result::Result<(), String> {
+pub fn check_counts(
+    attributes: &BTreeMap<String, AttributeValues>,
+    vertices: usize,
+    triangles: usize,
+) -> std::result::Result<(), String> {
     for (name, values) in attributes {
-        let (count, what) = if is_of_faces(name) == Some(true) { (triangles, "triangles") } else { (vertices, "vertices") };
+        let (count, what) =
+            if is_of_faces(name) == Some(true) { (triangles, "triangles") } else { (vertices, "vertices") };
         if values.len() != count {
             return Err(format!("the attribute \"{name}\": {} for {count} {what}", values.len()));
         }

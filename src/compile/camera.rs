@@ -3,7 +3,7 @@
 use super::CompileContext;
 use super::transforms::Shutter;
 use crate::camera::{Blades, Camera, Framing, Lens, Projection, lens_equation};
-use crate::desc::{CameraDesc, CameraKindDesc, KeyframeDesc, LensDesc};
+use crate::desc::{BladesDesc, CameraDesc, CameraKindDesc, KeyframeDesc, LensDesc};
 use crate::error::Result;
 use crate::math::{DAffine3, DMat3, DVec3, Motion, RenderSpace, Transform};
 
@@ -28,7 +28,9 @@ pub fn compile(files: &CompileContext, desc: &CameraDesc) -> Result<Camera> {
             Projection::Perspective { half_height, lens }
         }
         CameraKindDesc::Orthographic => {
-            let height = desc.view_height.ok_or_else(|| files.error("camera", "an orthographic camera needs a `view_height`"))?;
+            let height = desc
+                .view_height
+                .ok_or_else(|| files.error("camera", "an orthographic camera needs a `view_height`"))?;
             Projection::Orthographic { half_height: 0.5 * files.positive("camera.view_height", height)? }
         }
         CameraKindDesc::Environment => Projection::Environment,
@@ -37,7 +39,10 @@ pub fn compile(files: &CompileContext, desc: &CameraDesc) -> Result<Camera> {
         return Err(files.error("camera.near", format!("must be finite and not negative, not {}", desc.near)));
     }
     let motion = motion(files, &desc.motion, &map, shutter(files, desc)?)?;
-    let camera = Camera::new(transform, projection).with_framing(framing(files, desc)?).with_near(desc.near).with_shutter(desc.shutter);
+    let camera = Camera::new(transform, projection)
+        .with_framing(framing(files, desc)?)
+        .with_near(desc.near)
+        .with_shutter(desc.shutter);
     camera.with_motion(motion).ok_or_else(|| files.error("camera.motion", "the motion is singular"))
 }
 
@@ -46,14 +51,17 @@ pub fn place_in(files: &CompileContext, desc: &CameraDesc, camera: Camera, space
     let place = if desc.position.is_some() { "camera.position" } else { "camera.transform" };
     let position = camera.position();
     files.reachable(place, position, &space)?;
-    camera.in_render_space(space).ok_or_else(|| files.error(place, "the camera cannot be placed beside a scene of this size"))
+    camera
+        .in_render_space(space)
+        .ok_or_else(|| files.error(place, "the camera cannot be placed beside a scene of this size"))
 }
 
 /// When the shutter is open.
 fn shutter(files: &CompileContext, desc: &CameraDesc) -> Result<Shutter> {
     let [open, close] = desc.shutter;
     if !(open.is_finite() && close.is_finite() && open <= close && (close - open).is_finite()) {
-        return Err(files.error("camera.shutter", format!("must be finite and not close before it opens, not {:?}", desc.shutter)));
+        return Err(files
+            .error("camera.shutter", format!("must be finite and not close before it opens, not {:?}", desc.shutter)));
     }
     Ok(desc.shutter.into())
 }
@@ -104,10 +112,14 @@ fn framing(files: &CompileContext, desc: &CameraDesc) -> Result<Framing> {
 
 fn placement(files: &CompileContext, desc: &CameraDesc) -> Result<DAffine3> {
     match (&desc.transform, desc.position, desc.look_at) {
-        (None, Some(position), Some(look_at)) => files.look_at("camera", position, look_at, desc.up.unwrap_or([0.0, 1.0, 0.0])),
+        (None, Some(position), Some(look_at)) => {
+            files.look_at("camera", position, look_at, desc.up.unwrap_or([0.0, 1.0, 0.0]))
+        }
         (Some(transform), None, None) if desc.up.is_none() => {
             let map = files.affine("camera.transform", transform)?;
-            rigid(&map).ok_or_else(|| files.error("camera.transform", "must be a rotation and translation (a uniform scale is ignored)"))
+            rigid(&map).ok_or_else(|| {
+                files.error("camera.transform", "must be a rotation and translation (a uniform scale is ignored)")
+            })
         }
         (None, None, None) => Err(files.error("camera", "give `position` and `look_at`, or `transform`")),
         (Some(_), ..) => Err(files.error("camera", "give either `transform`, or `position`, `look_at` and `up`")),
@@ -129,33 +141,42 @@ fn rigid(map: &DAffine3) -> Option<DAffine3> {
 }
 
 fn compile_lens(files: &CompileContext, desc: &LensDesc, camera: &Transform, half_height: f64) -> Result<Lens> {
-    let positive = |key: &str, value: Option<f64>| value.map(|v| files.positive(&format!("camera.lens.{key}"), v)).transpose();
+    let positive =
+        |key: &str, value: Option<f64>| value.map(|v| files.positive(&format!("camera.lens.{key}"), v)).transpose();
     let (radius, f_number) = (positive("radius", desc.radius)?, positive("f_number", desc.f_number)?);
     let focal_length = positive("focal_length", desc.focal_length)?;
     let focus = focus_distance(files, desc, camera)?;
-    let sensor = match (positive("sensor_distance", desc.sensor_distance)?, positive("sensor_height", desc.sensor_height)?) {
-        (Some(_), Some(_)) => return Err(files.error("camera.lens", "give either `sensor_distance` or `sensor_height`")),
-        (None, Some(height)) => Some(height / (2.0 * half_height)),
-        (distance, None) => distance,
-    };
+    let sensor =
+        match (positive("sensor_distance", desc.sensor_distance)?, positive("sensor_height", desc.sensor_height)?) {
+            (Some(_), Some(_)) => {
+                return Err(files.error("camera.lens", "give either `sensor_distance` or `sensor_height`"));
+            }
+            (None, Some(height)) => Some(height / (2.0 * half_height)),
+            (distance, None) => distance,
+        };
 
     // Any two of focal length, sensor distance and focus distance give the third.
     let (focal_length, focus_distance) = match (focal_length, sensor, focus) {
         (Some(_), Some(_), Some(_)) => {
-            let message = "`focal_length`, the sensor and the focus are one too many: two of them give the third by the lens equation";
+            let message = "`focal_length`, the sensor and the focus are one too many: two of them give the third by \
+                           the lens equation";
             return Err(files.error("camera.lens", message));
         }
         (Some(f), Some(a), None) => {
             let b = lens_equation(f, a).filter(|b| b.is_finite());
             let b = b.ok_or_else(|| {
-                files.error("camera.lens", format!("nothing is in focus: the sensor's distance {a} must be above the focal length {f}"))
+                files.error(
+                    "camera.lens",
+                    format!("nothing is in focus: the sensor's distance {a} must be above the focal length {f}"),
+                )
             })?;
             (Some(f), b)
         }
         (None, Some(a), Some(b)) => (Some(1.0 / (1.0 / a + 1.0 / b)), b),
         (f, None, Some(b)) => (f, b),
         (_, _, None) => {
-            let message = "give `focus_distance` or `focus_point`, or `focal_length` with `sensor_distance` or `sensor_height`";
+            let message =
+                "give `focus_distance` or `focus_point`, or `focal_length` with `sensor_distance` or `sensor_height`";
             return Err(files.error("camera.lens", message));
         }
     };
@@ -163,20 +184,25 @@ fn compile_lens(files: &CompileContext, desc: &LensDesc, camera: &Transform, hal
         (Some(radius), None, _) => radius,
         (None, Some(n), Some(f)) => f / (2.0 * n),
         (None, Some(_), None) => {
-            return Err(files.error("camera.lens", "`f_number` needs `focal_length`, or a sensor from which to find it"));
+            return Err(
+                files.error("camera.lens", "`f_number` needs `focal_length`, or a sensor from which to find it")
+            );
         }
         _ => return Err(files.error("camera.lens", "give either `radius` or `f_number`")),
     };
-    let blades = desc.blades.map(|blades| {
-        if !(3..=MAX_BLADES).contains(&blades.count) {
-            return Err(files.error("camera.lens.blades.count", format!("must be from 3 to {MAX_BLADES}, not {}", blades.count)));
-        }
-        if !blades.rotation_degrees.is_finite() {
-            return Err(files.error("camera.lens.blades.rotation_degrees", "the angle is not finite"));
-        }
-        Ok(Blades { count: blades.count, rotation: blades.rotation_degrees.to_radians() })
-    });
-    Ok(Lens { radius, focus_distance, blades: blades.transpose()? })
+    let blades = desc.blades.map(|blades| compile_blades(files, &blades)).transpose()?;
+    Ok(Lens { radius, focus_distance, blades })
+}
+
+fn compile_blades(files: &CompileContext, desc: &BladesDesc) -> Result<Blades> {
+    if !(3..=MAX_BLADES).contains(&desc.count) {
+        let message = format!("must be from 3 to {MAX_BLADES}, not {}", desc.count);
+        return Err(files.error("camera.lens.blades.count", message));
+    }
+    if !desc.rotation_degrees.is_finite() {
+        return Err(files.error("camera.lens.blades.rotation_degrees", "the angle is not finite"));
+    }
+    Ok(Blades { count: desc.count, rotation: desc.rotation_degrees.to_radians() })
 }
 
 /// The focus if it is given.
@@ -205,10 +231,12 @@ mod tests {
     }
 
     fn lens(json: &str) -> Lens {
-        *camera(&format!(r#"{{ "position": [0, 0, 5], "look_at": [0, 0, 0], "vertical_fov_degrees": 90, "lens": {json} }}"#))
-            .unwrap()
-            .lens()
-            .unwrap()
+        *camera(&format!(
+            r#"{{ "position": [0, 0, 5], "look_at": [0, 0, 0], "vertical_fov_degrees": 90, "lens": {json} }}"#
+        ))
+        .unwrap()
+        .lens()
+        .unwrap()
     }
 
     #[test]

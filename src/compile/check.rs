@@ -53,7 +53,11 @@ impl CompileContext {
 
     /// A finite number above zero.
     pub(super) fn positive(&self, path: &str, value: f64) -> Result<f64> {
-        if value > 0.0 && value.is_finite() { Ok(value) } else { Err(self.error(path, format!("must be finite and above 0, not {value}"))) }
+        if value > 0.0 && value.is_finite() {
+            Ok(value)
+        } else {
+            Err(self.error(path, format!("must be finite and above 0, not {value}")))
+        }
     }
 
     /// Radiance, intensity and the like: not negative, and at most [`BRIGHTEST`].
@@ -70,7 +74,10 @@ impl CompileContext {
         if value.iter().all(|&v| (0.0..=1.0).contains(&v)) {
             Ok(value)
         } else {
-            Err(self.error(path, format!("{value:?} must be within 0 and 1: a surface cannot reflect more than it receives")))
+            Err(self.error(
+                path,
+                format!("{value:?} must be within 0 and 1: a surface cannot reflect more than it receives"),
+            ))
         }
     }
 }

@@ -25,7 +25,8 @@ impl Builder {
         let materials = &self.materials.materials;
         let look_alike = |a: ShapeId, b: ShapeId| {
             let [x, y] = [a, b].map(|id| &self.surfaces[id.index()]);
-            let same_material = x.material == y.material || materials[x.material.index()] == materials[y.material.index()];
+            let same_material =
+                x.material == y.material || materials[x.material.index()] == materials[y.material.index()];
             let same_opacity = self.opacities[a.index()] == self.opacities[b.index()];
             same_material
                 && same_opacity
@@ -38,8 +39,8 @@ impl Builder {
         self.files.warn(
             first,
             format_args!(
-                "{what} with others of another orientation or material (the first with one of {whose}): which of them a ray meets, and so the \
-                 picture, depends on the accelerator; remove one of each pair or move it"
+                "{what} with others of another orientation or material (the first with one of {whose}): which of them \
+                 a ray meets, and so the picture, depends on the accelerator; remove one of each pair or move it"
             ),
         );
     }
@@ -73,8 +74,9 @@ fn find(geometry: &Geometry, look_alike: impl Fn(ShapeId, ShapeId) -> bool) -> O
     let mut found: Option<(Coincident, (ShapeId, PrimId))> = None;
     for same in places.chunk_by(|a, b| (a.group, &a.corners) == (b.group, &b.corners)) {
         let first = &same[0];
-        let differs =
-            |other: &&Place| first.is_even != other.is_even || (first.shape != other.shape && !look_alike(first.shape, other.shape));
+        let differs = |other: &&Place| {
+            first.is_even != other.is_even || (first.shape != other.shape && !look_alike(first.shape, other.shape))
+        };
         let others: Vec<&Place> = same[1..].iter().filter(differs).collect();
         let Some(other) = others.first() else { continue };
         let at = (first.shape, first.prim);
@@ -94,14 +96,20 @@ fn keys(meshes: &[(u64, ShapeId, &Mesh)]) -> Vec<u32> {
     for (group, _, mesh) in meshes {
         let steps: Vec<&[[f32; 3]]> = mesh.padded_steps().collect();
         let count = mesh.positions().len();
-        let hash = |vertex: usize| (steps.iter().fold(*group, |hash, positions| hash_of(hash, bits(positions[vertex]))) >> 32) as u32;
-        let key = |vertices: &[u32], corners: &[u32; 3]| corners.iter().fold(0u32, |sum, &i| sum.wrapping_add(vertices[i as usize]));
+        let hash = |vertex: usize| {
+            (steps.iter().fold(*group, |hash, positions| hash_of(hash, bits(positions[vertex]))) >> 32) as u32
+        };
+        let key = |vertices: &[u32], corners: &[u32; 3]| {
+            corners.iter().fold(0u32, |sum, &i| sum.wrapping_add(vertices[i as usize]))
+        };
         vertices.clear();
         if mesh.triangles().len() < MANY {
             vertices.extend((0..count).map(hash));
             keys.extend(mesh.triangles().iter().map(|corners| key(&vertices, corners)));
         } else {
-            vertices.par_extend(steps[0][..count].par_iter().enumerate().with_min_len(MANY).map(|(vertex, _)| hash(vertex)));
+            vertices.par_extend(
+                steps[0][..count].par_iter().enumerate().with_min_len(MANY).map(|(vertex, _)| hash(vertex)),
+            );
             keys.par_extend(mesh.triangles().par_iter().with_min_len(MANY).map(|corners| key(&vertices, corners)));
         }
     }
@@ -127,7 +135,8 @@ fn repeated(keys: &[u32]) -> Vec<u32> {
     for key in suspects {
         second.insert(key);
     }
-    let mut candidates: Vec<u32> = keys.par_iter().with_min_len(MANY).copied().filter(|key| second.contains(*key)).collect();
+    let mut candidates: Vec<u32> =
+        keys.par_iter().with_min_len(MANY).copied().filter(|key| second.contains(*key)).collect();
     candidates.sort_unstable();
     let mut repeated: Vec<u32> = candidates.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect();
     repeated.dedup();
@@ -176,7 +185,8 @@ struct Place {
 impl Place {
     fn new(group: u64, shape: ShapeId, mesh: &Mesh, prim: PrimId) -> Self {
         let vertices = mesh.triangles()[prim.index()];
-        let at = |i: usize| mesh.padded_steps().map(|positions| bits(positions[vertices[i] as usize])).collect::<Vec<_>>();
+        let at =
+            |i: usize| mesh.padded_steps().map(|positions| bits(positions[vertices[i] as usize])).collect::<Vec<_>>();
         let mut corners = [0, 1, 2].map(|i| (at(i), i));
         corners.sort_unstable();
         let order = [0, 1, 2].map(|i: usize| corners[i].1);
@@ -190,7 +200,8 @@ mod tests {
     use super::*;
     use crate::geometry::{MeshStep, Object};
 
-    const POSITIONS: [[f32; 3]; 5] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-0.0, 1.0, -0.0], [1.0, 1.0, 0.0]];
+    const POSITIONS: [[f32; 3]; 5] =
+        [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-0.0, 1.0, -0.0], [1.0, 1.0, 0.0]];
 
     fn mesh(triangles: &[[u32; 3]]) -> Shape {
         Shape::Mesh(Mesh::new(POSITIONS.to_vec(), triangles.to_vec(), None, None).unwrap())
@@ -224,9 +235,11 @@ mod tests {
         let unlike = |_: ShapeId, _: ShapeId| false;
         let shapes = vec![mesh(&[[0, 1, 2]]), mesh(&[[0, 1, 2]]), mesh(&[[2, 0, 1]])];
         let object = |shapes: &[usize]| Object { shapes: shapes.iter().map(|&i| ShapeId::new(i)).collect() };
-        let apart = Geometry { shapes: shapes.clone(), objects: vec![object(&[0]), object(&[1])], ..Geometry::default() };
+        let apart =
+            Geometry { shapes: shapes.clone(), objects: vec![object(&[0]), object(&[1])], ..Geometry::default() };
         assert_eq!(find(&apart, unlike), None);
-        let together = Geometry { shapes, world: vec![ShapeId::new(0)], objects: vec![object(&[1, 2])], ..Geometry::default() };
+        let together =
+            Geometry { shapes, world: vec![ShapeId::new(0)], objects: vec![object(&[1, 2])], ..Geometry::default() };
         assert_eq!(find(&together, unlike), found(1, [1, 2]));
         let deforming = |z: f32| {
             let Shape::Mesh(mesh) = mesh(&[[0, 1, 2]]) else { unreachable!() };
@@ -242,9 +255,11 @@ mod tests {
         let n = 100u32;
         let positions: Vec<[f32; 3]> = (0..n * n).map(|i| [(i % n) as f32, (i / n) as f32, 0.0]).collect();
         let corners = (0..n * (n - 1)).filter(|i| i % n + 1 < n);
-        let mut triangles: Vec<[u32; 3]> = corners.flat_map(|i| [[i, i + 1, i + n], [i + 1, i + n + 1, i + n]]).collect();
+        let mut triangles: Vec<[u32; 3]> =
+            corners.flat_map(|i| [[i, i + 1, i + n], [i + 1, i + n + 1, i + n]]).collect();
         assert!(triangles.len() > 2 * MANY);
-        let shape = |triangles: &[[u32; 3]]| Shape::Mesh(Mesh::new(positions.clone(), triangles.to_vec(), None, None).unwrap());
+        let shape =
+            |triangles: &[[u32; 3]]| Shape::Mesh(Mesh::new(positions.clone(), triangles.to_vec(), None, None).unwrap());
         let alike = |_: ShapeId, _: ShapeId| true;
         assert_eq!(find(&world(vec![shape(&triangles), shape(&triangles)]), alike), None);
         let whole = shape(&triangles);

@@ -40,7 +40,9 @@ impl MaterialTable {
                     let path = format!("{path}.{key}");
                     let id = self.part(compiler, desc, &path, part, outer)?;
                     if self.transmits(id) {
-                        return Err(compiler.files.error(&path, format!("\"{part}\" lets light through: both sides must be opaque")));
+                        return Err(compiler
+                            .files
+                            .error(&path, format!("\"{part}\" lets light through: both sides must be opaque")));
                     }
                     Ok(id)
                 };
@@ -57,7 +59,10 @@ impl MaterialTable {
                 }
                 self.check_no_relief(compiler, &place, base, base_id)?;
                 let coating = Coating {
-                    coat: CoatInput::new(compiler.ior(&path, ior, 1.0)?, compiler.alpha(&path, roughness.as_ref(), alpha.as_ref())?),
+                    coat: CoatInput::new(
+                        compiler.ior(&path, ior, 1.0)?,
+                        compiler.alpha(&path, roughness.as_ref(), alpha.as_ref())?,
+                    ),
                     tint: compiler.color(&format!("{path}.tint"), tint)?,
                 };
                 self.coated(base_id, &coating, &mut HashMap::new())
@@ -84,7 +89,9 @@ impl MaterialTable {
         outer: &mut Vec<&'a str>,
     ) -> Result<MaterialId> {
         if outer.contains(&part) {
-            return Err(compiler.files.error(path, format!("the material consists of itself: {} -> {part}", outer.join(" -> "))));
+            return Err(compiler
+                .files
+                .error(path, format!("the material consists of itself: {} -> {part}", outer.join(" -> "))));
         }
         if outer.len() >= MAX_DEPTH {
             return Err(compiler.files.error(path, format!("materials are nested more than {MAX_DEPTH} deep")));
@@ -111,7 +118,12 @@ impl MaterialTable {
         }
     }
 
-    fn coated_part(&mut self, id: MaterialId, coating: &Coating, done: &mut HashMap<MaterialId, MaterialId>) -> MaterialId {
+    fn coated_part(
+        &mut self,
+        id: MaterialId,
+        coating: &Coating,
+        done: &mut HashMap<MaterialId, MaterialId>,
+    ) -> MaterialId {
         if let Some(coated) = done.get(&id) {
             return *coated;
         }

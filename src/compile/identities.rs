@@ -63,7 +63,9 @@ impl IdentityTable {
         let common = desc.common();
         let stem = match desc {
             // Inline data in place of a file has no name in the scene.
-            ShapeDesc::Mesh(mesh) => mesh.file.as_deref().filter(|file| !files.source.assets.meshes.contains_key(*file)),
+            ShapeDesc::Mesh(mesh) => {
+                mesh.file.as_deref().filter(|file| !files.source.assets.meshes.contains_key(*file))
+            }
             _ => None,
         };
         let stem = stem.and_then(|file| Path::new(file).file_stem()).map(|stem| stem.to_string_lossy().into_owned());

@@ -11,7 +11,13 @@ type Column<'a> = Vec<Option<&'a TransformStepDesc>>;
 
 impl CompileContext {
     /// The motion of keyframes after `map`, its times as shares of the shutter interval; just `map` if there are none.
-    pub(super) fn motion(&self, path: &str, keyframes: &[KeyframeDesc], map: &DAffine3, shutter: Shutter) -> Result<Motion> {
+    pub(super) fn motion(
+        &self,
+        path: &str,
+        keyframes: &[KeyframeDesc],
+        map: &DAffine3,
+        shutter: Shutter,
+    ) -> Result<Motion> {
         let constant = Motion::constant(*map);
         if keyframes.is_empty() {
             return Ok(constant);
@@ -19,10 +25,15 @@ impl CompileContext {
         let mut list = Vec::with_capacity(keyframes.len());
         for (i, keyframe) in keyframes.iter().enumerate() {
             let path = format!("{path}[{i}]");
-            let map = self.transform(&format!("{path}.transform"), &keyframe.transform, &DAffine3::IDENTITY)?.world_from_object;
-            let (time, previous) = (shutter.share(keyframe.time), list.last().map_or(f64::NEG_INFINITY, |(time, _)| *time));
+            let map = self
+                .transform(&format!("{path}.transform"), &keyframe.transform, &DAffine3::IDENTITY)?
+                .world_from_object;
+            let (time, previous) =
+                (shutter.share(keyframe.time), list.last().map_or(f64::NEG_INFINITY, |(time, _)| *time));
             if !time.is_finite() || time <= previous {
-                return Err(self.error(&format!("{path}.time"), "times must be finite and grow from keyframe to keyframe"));
+                return Err(
+                    self.error(&format!("{path}.time"), "times must be finite and grow from keyframe to keyframe")
+                );
             }
             list.push((time, map));
         }
@@ -54,7 +65,8 @@ impl CompileContext {
         let map = |step: &Option<&TransformStepDesc>| step.map_or(Ok(DAffine3::IDENTITY), |step| self.step(path, step));
         let maps = column.iter().map(map).collect::<Result<Vec<DAffine3>>>()?;
         if let Some(angles) = angles(column) {
-            let list: Vec<_> = times.iter().copied().zip(angles.degrees.iter().map(|degrees| degrees.to_radians())).collect();
+            let list: Vec<_> =
+                times.iter().copied().zip(angles.degrees.iter().map(|degrees| degrees.to_radians())).collect();
             let still = angles.degrees.windows(2).all(|pair| pair[0] == pair[1]);
             return Ok(if still { Some(Motion::constant(maps[0])) } else { Motion::turning(angles.axis, &list) });
         }
@@ -69,7 +81,9 @@ impl CompileContext {
     fn pivot(&self, path: &str, lists: &[&TransformDesc]) -> Result<DVec3> {
         let mut pivot: Option<DVec3> = None;
         for list in lists {
-            let shifts = |step: &TransformStepDesc| matches!(step, TransformStepDesc::Translate(_) | TransformStepDesc::Scale(_));
+            let shifts = |step: &TransformStepDesc| {
+                matches!(step, TransformStepDesc::Translate(_) | TransformStepDesc::Scale(_))
+            };
             let Some(turn) = list.0.iter().position(|step| !shifts(step)) else { continue };
             let before = self.affine(path, &TransformDesc(list.0[..turn].to_vec()))?;
             let point = before.inverse().translation;
@@ -156,14 +170,17 @@ mod tests {
         DAffine3::from_rotation_y(degrees.to_radians())
     }
 
-    const TURN: &str = r#"{ "translate": [-3, -1, 2] }, { "rotate": { "axis": [0, 2, 0], "degrees": 120 } }, { "translate": [3, 1, -2] }"#;
+    const TURN: &str = r#"{ "translate": [-3, -1, 2] }, { "rotate": { "axis": [0, 2, 0], "degrees": 120 } },
+        { "translate": [3, 1, -2] }"#;
 
     #[test]
     fn what_turns_about_a_point_turns_in_place() {
         let still = r#"{ "translate": [-3, -1, 2] }, { "translate": [3, 1, -2] }"#;
         let zero = TURN.replace("120", "0");
         for first in ["", still, &zero] {
-            let motion = motion(&format!(r#"[{{ "time": 0, "transform": [{first}] }}, {{ "time": 1, "transform": [{TURN}] }}]"#));
+            let motion = motion(&format!(
+                r#"[{{ "time": 0, "transform": [{first}] }}, {{ "time": 1, "transform": [{TURN}] }}]"#
+            ));
             let pivot = DVec3::new(3.0, 1.0, -2.0);
             assert_path(&motion, pivot, |_| pivot);
             assert_path(&motion, pivot + DVec3::X, |time| pivot + around_y(120.0 * time).transform_vector3(DVec3::X));
@@ -175,12 +192,14 @@ mod tests {
         // Two spins while half an orbit goes by and the size doubles.
         let at = |spin: i32, size: i32, orbit: i32, axis: &str| {
             format!(
-                r#"[{{ "scale": {size} }}, {{ "rotate": {{ "axis": [0, 1, 0], "degrees": {spin} }} }}, {{ "translate": [5, 0, 0] }},
+                r#"[{{ "scale": {size} }}, {{ "rotate": {{ "axis": [0, 1, 0], "degrees": {spin} }} }},
+                    {{ "translate": [5, 0, 0] }},
                     {{ "rotate": {{ "axis": {axis}, "degrees": {orbit} }} }}]"#
             )
         };
         let (first, last) = (at(0, 1, 0, "[0, 1, 0]"), at(720, 2, -180, "[0, -3, 0]"));
-        let motion = motion(&format!(r#"[{{ "time": 0, "transform": {first} }}, {{ "time": 1, "transform": {last} }}]"#));
+        let motion =
+            motion(&format!(r#"[{{ "time": 0, "transform": {first} }}, {{ "time": 1, "transform": {last} }}]"#));
         let orbit = |time: f64| around_y(180.0 * time);
         assert_path(&motion, DVec3::ZERO, |time| orbit(time).transform_point3(5.0 * DVec3::X));
         assert_path(&motion, DVec3::Z, |time| {
@@ -199,7 +218,9 @@ mod tests {
         ));
         let center = |time: f64| DVec3::new(1.0 - time, 8.0 * time, 0.0);
         assert_path(&motion, DVec3::ZERO, center);
-        assert_path(&motion, DVec3::X, |time| center(time) + around_y(90.0 * time).transform_vector3(DVec3::X) * (1.0 + time));
+        assert_path(&motion, DVec3::X, |time| {
+            center(time) + around_y(90.0 * time).transform_vector3(DVec3::X) * (1.0 + time)
+        });
     }
 
     #[test]

@@ -10,8 +10,8 @@ use crate::desc::{EnvironmentLightDesc, IesLightDesc, LightDesc, ProjectorLightD
 use crate::error::Result;
 use crate::id::{LightGroupId, LightId};
 use crate::light::{
-    DirectionalLight, Environment, EnvironmentMap, IesLight, IesProfile, Light, LightGroups, PointLight, Projector, SpotLight,
-    TextureProjection,
+    DirectionalLight, Environment, EnvironmentMap, IesLight, IesProfile, Light, LightGroups, PointLight, Projector,
+    SpotLight, TextureProjection,
 };
 use crate::math::{DAffine3, DMat3, DVec3, RenderSpace, Vec2};
 use crate::texture::Texture;
@@ -34,11 +34,16 @@ impl LightTable {
     pub fn group(&mut self, files: &CompileContext, path: &str, name: Option<&str>) -> Result<Option<LightGroupId>> {
         let Some(name) = name.filter(|name| *name != LightGroups::OF_THE_REST) else { return Ok(None) };
         if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
-            let message = format!("\"{name}\" must be made of letters, digits and underscores: it becomes the name of a layer");
+            let message =
+                format!("\"{name}\" must be made of letters, digits and underscores: it becomes the name of a layer");
             return Err(files.error(&format!("{path}.group"), message));
         }
         if name.len() > MOST_LETTERS {
-            let message = format!("\"{:.20}...\" has {} letters: at most {MOST_LETTERS} make the name of a layer", name, name.len());
+            let message = format!(
+                "\"{:.20}...\" has {} letters: at most {MOST_LETTERS} make the name of a layer",
+                name,
+                name.len()
+            );
             return Err(files.error(&format!("{path}.group"), message));
         }
         let index = self.names.iter().position(|known| known == name).unwrap_or_else(|| {
@@ -63,7 +68,13 @@ impl LightTable {
 }
 
 /// One entry of `lights`, placed into `space`.
-pub fn compile(files: &CompileContext, path: &str, desc: &LightDesc, space: &RenderSpace, textures: &TextureTable) -> Result<Light> {
+pub fn compile(
+    files: &CompileContext,
+    path: &str,
+    desc: &LightDesc,
+    space: &RenderSpace,
+    textures: &TextureTable,
+) -> Result<Light> {
     let at = |key: &str| format!("{path}.{key}");
     Ok(match desc {
         LightDesc::Point(light) => Light::Point(PointLight {
@@ -72,11 +83,15 @@ pub fn compile(files: &CompileContext, path: &str, desc: &LightDesc, space: &Ren
         }),
         LightDesc::Spot(light) => {
             let position = files.placed(&at("position"), light.position, space)?;
-            let toward = files.position(&at("look_at"), light.look_at)? - files.position(&at("position"), light.position)?;
-            let axis = toward.try_normalize().ok_or_else(|| files.error(&at("look_at"), "is the light's own position"))?;
+            let toward =
+                files.position(&at("look_at"), light.look_at)? - files.position(&at("position"), light.position)?;
+            let axis =
+                toward.try_normalize().ok_or_else(|| files.error(&at("look_at"), "is the light's own position"))?;
             let cutoff = light.cutoff_angle_degrees;
             if !(cutoff > 0.0 && cutoff <= 180.0) {
-                return Err(files.error(&at("cutoff_angle_degrees"), format!("must be above 0 and at most 180, not {cutoff}")));
+                return Err(
+                    files.error(&at("cutoff_angle_degrees"), format!("must be above 0 and at most 180, not {cutoff}"))
+                );
             }
             let beam = light.beam_angle_degrees.unwrap_or(0.75 * cutoff);
             let beam = files.within(&at("beam_angle_degrees"), beam, 0.0, cutoff)?;
@@ -84,7 +99,9 @@ pub fn compile(files: &CompileContext, path: &str, desc: &LightDesc, space: &Ren
             let spot = SpotLight::new(position, axis, intensity, beam.to_radians(), cutoff.to_radians());
             let Some(name) = &light.texture else { return Ok(Light::Spot(Box::new(spot))) };
             if cutoff >= 90.0 {
-                return Err(files.error(&at("cutoff_angle_degrees"), format!("must be below 90 with a texture, not {cutoff}")));
+                return Err(
+                    files.error(&at("cutoff_angle_degrees"), format!("must be below 90 with a texture, not {cutoff}"))
+                );
             }
             let texture = textures.of_light(files, &at("texture"), name, intensity)?;
             let half = Vec2::splat(cutoff.to_radians().tan() as f32);
@@ -98,7 +115,8 @@ pub fn compile(files: &CompileContext, path: &str, desc: &LightDesc, space: &Ren
             let irradiance = files.emitted(&at("irradiance"), light.irradiance)?.into();
             let diameter = light.angular_diameter_degrees;
             if !(0.0..180.0).contains(&diameter) {
-                return Err(files.error(&at("angular_diameter_degrees"), format!("must be from 0 to below 180, not {diameter}")));
+                return Err(files
+                    .error(&at("angular_diameter_degrees"), format!("must be from 0 to below 180, not {diameter}")));
             }
             Light::Directional(Box::new(DirectionalLight::new(direction, irradiance, diameter.to_radians())))
         }
@@ -126,7 +144,8 @@ impl CompileContext {
     fn intensity(&self, path: &str, value: [f32; 3], space: &RenderSpace) -> Result<Rgb> {
         let scale = space.scale() * space.scale();
         let scaled = self.emitted(path, value)?.map(|channel| (f64::from(channel) * scale) as f32);
-        if scaled.iter().zip(value).any(|(&scaled, given)| !scaled.is_finite() || (given > 0.0 && !scaled.is_normal())) {
+        if scaled.iter().zip(value).any(|(&scaled, given)| !scaled.is_finite() || (given > 0.0 && !scaled.is_normal()))
+        {
             return Err(self.error(path, format!("{value:?} is out of all proportion to a scene of this size")));
         }
         Ok(scaled.into())
@@ -149,7 +168,8 @@ fn projector(
     if !(fov > 0.0 && fov < 180.0) {
         return Err(files.error(&at("vertical_fov_degrees"), format!("must be above 0 and below 180, not {fov}")));
     }
-    let texture = desc.texture.as_ref().map(|name| textures.of_light(files, &at("texture"), name, irradiance)).transpose()?;
+    let texture =
+        desc.texture.as_ref().map(|name| textures.of_light(files, &at("texture"), name, irradiance)).transpose()?;
     let of_image = match texture.map(|id| textures.get(id)) {
         Some(Texture::Bitmap(bitmap)) => bitmap.image.width() as f64 / bitmap.image.height() as f64,
         _ => 1.0,
@@ -158,7 +178,9 @@ fn projector(
     let half = (0.5 * fov.to_radians()).tan();
     let half = Vec2::new((half * aspect) as f32, half as f32);
     if !(aspect > 0.0 && half.min_element() > 0.0 && half.is_finite()) {
-        return Err(files.error(&at("aspect"), format!("must be above 0 and of a picture that can be thrown, not {aspect}")));
+        return Err(
+            files.error(&at("aspect"), format!("must be above 0 and of a picture that can be thrown, not {aspect}"))
+        );
     }
     let projection = TextureProjection::new(texture, axis, files.up(&at("up"), desc.up, axis)?, half);
     Ok(Projector::new(position, irradiance, projection, &textures.textures))
@@ -183,7 +205,8 @@ fn ies(files: &CompileContext, path: &str, desc: &IesLightDesc, space: &RenderSp
     let asset = files.source.asset(&desc.file);
     let data = read_ies(&asset).map_err(|e| files.asset_error(&place, &asset, e))?;
     let profile = IesProfile::new(data.vertical, data.horizontal, data.candela);
-    let profile = profile.ok_or_else(|| files.asset_error(&place, &asset, AssetError::Malformed("no table of intensities".into())))?;
+    let profile = profile
+        .ok_or_else(|| files.asset_error(&place, &asset, AssetError::Malformed("no table of intensities".into())))?;
     Ok(IesLight::new(position, nadir, desc.rotation_degrees.to_radians(), intensity, Arc::new(profile)))
 }
 

@@ -1,20 +1,20 @@
 //! Materials: names to ids, parameters to BSDFs.
 
 use std::collections::HashMap;
-use std::fmt::Debug;
 
 use super::CompileContext;
 use super::textures::{TextureTable, TextureUse};
-use crate::assets::ObjMaterial;
-use crate::bsdf::{Beckmann, Coat, Conductor, Dielectric, Ggx, Lambert, Mirror, Plastic, SeparableGgx, diffuse_mean, mitsuba_diffuse_mean};
+use crate::bsdf::{Beckmann, Coat, Conductor, Ggx, Lambert, SeparableGgx, diffuse_mean, mitsuba_diffuse_mean};
 use crate::color::Rgb;
 use crate::desc::{
-    ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, PlasticDesc, RangedDesc, RoughnessDesc, ScalarDesc,
-    SceneDesc, UsedNames,
+    ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, PlasticDesc, RangedDesc, RoughnessDesc,
+    ScalarDesc, SceneDesc, UsedNames,
 };
 use crate::error::Result;
 use crate::id::{MaterialId, NormalPerturbationId, TextureId};
-use crate::material::{AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, RangedInput, ScalarInput, TexturedMaterial};
+use crate::material::{
+    AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, RangedInput, ScalarInput, TexturedMaterial,
+};
 use crate::medium::{Media, Medium};
 use crate::metal::{Metal, MetalNames};
 use crate::normal_perturbation::NormalPerturbation;
@@ -116,7 +116,8 @@ impl MaterialTable {
     /// Whether a surface with it needs uv.
     pub fn needs_uv(&self, binding: &MaterialBinding) -> bool {
         let cut_out = binding.opacity.is_some_and(|id| self.textures.get(id).uses_uv());
-        let needs = |id: MaterialId| self.has_texture(id, Texture::uses_uv) || self.normal_perturbation_of(id).is_some();
+        let needs =
+            |id: MaterialId| self.has_texture(id, Texture::uses_uv) || self.normal_perturbation_of(id).is_some();
         cut_out || binding.normal_perturbation.is_some() || self.any_part(binding.material, &needs)
     }
 
@@ -127,9 +128,11 @@ impl MaterialTable {
     /// Whether a surface's normals come from a normal map.
     pub fn has_normal_map(&self, binding: &MaterialBinding) -> bool {
         let is_map = |normal_perturbation: Option<NormalPerturbationId>| {
-            normal_perturbation.is_some_and(|id| matches!(self.normal_perturbations[id.index()], NormalPerturbation::NormalMap { .. }))
+            normal_perturbation
+                .is_some_and(|id| matches!(self.normal_perturbations[id.index()], NormalPerturbation::NormalMap { .. }))
         };
-        is_map(binding.normal_perturbation) || self.any_part(binding.material, &|id| is_map(self.normal_perturbation_of(id)))
+        is_map(binding.normal_perturbation)
+            || self.any_part(binding.material, &|id| is_map(self.normal_perturbation_of(id)))
     }
 
     /// The material of a name, or the default.
@@ -138,7 +141,9 @@ impl MaterialTable {
             return Ok(MaterialBinding::plain(Self::DEFAULT));
         };
         let found = self.names.get(name).copied();
-        found.ok_or_else(|| files.unknown(&format!("{path}.material"), "material", name, self.names.keys().map(String::as_str)))
+        found.ok_or_else(|| {
+            files.unknown(&format!("{path}.material"), "material", name, self.names.keys().map(String::as_str))
+        })
     }
 }
 
@@ -157,11 +162,13 @@ impl Compiler<'_> {
             }
             .into(),
             MaterialDesc::DiffuseTransmission { reflectance, transmittance } => {
-                let [reflectance, transmittance] = self.sum_to_one(path, ["reflectance", "transmittance"], [reflectance, transmittance])?;
+                let [reflectance, transmittance] =
+                    self.sum_to_one(path, ["reflectance", "transmittance"], [reflectance, transmittance])?;
                 TexturedMaterial::DiffuseTransmission { reflectance, transmittance }.into()
             }
             MaterialDesc::Mirror { reflectance } => {
-                TexturedMaterial::Mirror { reflectance: self.color(&format!("{path}.reflectance"), reflectance)? }.into()
+                TexturedMaterial::Mirror { reflectance: self.color(&format!("{path}.reflectance"), reflectance)? }
+                    .into()
             }
             MaterialDesc::Conductor { metal, eta, k, roughness, alpha, distribution, tint, multiscatter } => {
                 let (eta, k) = self.metal(path, metal.as_deref(), *eta, *k)?;
@@ -176,12 +183,7 @@ impl Compiler<'_> {
                 TexturedMaterial::ThinDielectric { ior: self.ior(path, ior, 0.1)?, tints }.into()
             }
             MaterialDesc::Phong { diffuse, specular, exponent, lobe } => {
-                let exponent = self.ranged(&format!("{path}.exponent"), exponent, |path, exponent| {
-                    let is_sound = exponent >= 0.0 && exponent.is_finite();
-                    if is_sound { Ok(()) } else { Err(files.error(path, format!("must be finite and not negative, not {exponent}"))) }
-                })?;
-                let [diffuse, specular] = self.sum_to_one(path, ["diffuse", "specular"], [diffuse, specular])?;
-                TexturedMaterial::Phong { diffuse, specular, exponent, cosine: *lobe == PhongLobeDesc::Cosine }.into()
+                self.phong(path, [diffuse, specular], exponent, *lobe)?.into()
             }
             MaterialDesc::CookTorrance { albedo, d, s, m, f0 } => {
                 let albedo = self.color(&format!("{path}.albedo"), albedo)?;
@@ -191,11 +193,16 @@ impl Compiler<'_> {
                 if let (ScalarInput::Constant(d), ScalarInput::Constant(s)) = (d, s)
                     && d + s > 1.0 + 1e-6
                 {
-                    return Err(files.error(path, format!("`d` and `s` must not exceed 1 together, but are {d} and {s}")));
+                    return Err(
+                        files.error(path, format!("`d` and `s` must not exceed 1 together, but are {d} and {s}"))
+                    );
                 }
                 TexturedMaterial::CookTorrance { albedo, d, s, m, f0 }.into()
             }
-            MaterialDesc::Mix { .. } | MaterialDesc::TwoSided { .. } | MaterialDesc::Coated { .. } | MaterialDesc::Relief { .. } => {
+            MaterialDesc::Mix { .. }
+            | MaterialDesc::TwoSided { .. }
+            | MaterialDesc::Coated { .. }
+            | MaterialDesc::Relief { .. } => {
                 return Err(files.error(path, "cannot be part of a material"));
             }
             MaterialDesc::Plastic(desc) => self.plastic(path, desc)?.into(),
@@ -207,9 +214,29 @@ impl Compiler<'_> {
         let ior = self.glass_ior(path, &desc.ior)?;
         let alpha = self.alpha(path, desc.roughness.as_ref(), desc.alpha.as_ref())?;
         let tints = self.tints(path, &desc.reflection_tint, &desc.transmission_tint)?;
-        let boundary = TexturedMaterial::Dielectric { ior, alpha, facets: facets(desc.distribution, desc.multiscatter), tints };
+        let boundary =
+            TexturedMaterial::Dielectric { ior, alpha, facets: facets(desc.distribution, desc.multiscatter), tints };
         // The relative index at a medium's surface depends on what is around it.
         Ok(if desc.is_medium() { Material::varying(boundary) } else { boundary.into() })
+    }
+
+    fn phong(
+        &self,
+        path: &str,
+        colors: [&ColorDesc; 2],
+        exponent: &RangedDesc,
+        lobe: PhongLobeDesc,
+    ) -> Result<TexturedMaterial> {
+        let exponent = self.ranged(&format!("{path}.exponent"), exponent, |path, exponent| {
+            let is_sound = exponent >= 0.0 && exponent.is_finite();
+            if is_sound {
+                Ok(())
+            } else {
+                Err(self.files.error(path, format!("must be finite and not negative, not {exponent}")))
+            }
+        })?;
+        let [diffuse, specular] = self.sum_to_one(path, ["diffuse", "specular"], colors)?;
+        Ok(TexturedMaterial::Phong { diffuse, specular, exponent, cosine: lobe == PhongLobeDesc::Cosine })
     }
 
     fn plastic(&self, path: &str, desc: &PlasticDesc) -> Result<TexturedMaterial> {
@@ -225,19 +252,26 @@ impl Compiler<'_> {
     fn plastic_coat(&self, path: &str, desc: &PlasticDesc) -> Result<PlasticCoat> {
         let ior = self.ranged(&format!("{path}.ior"), &desc.ior, |path, ior| {
             let is_sound = ior > 1.0 && ior <= 10.0;
-            if is_sound { Ok(()) } else { Err(self.files.error(path, format!("must be above 1 and at most 10, not {ior}"))) }
+            if is_sound {
+                Ok(())
+            } else {
+                Err(self.files.error(path, format!("must be above 1 and at most 10, not {ior}")))
+            }
         })?;
         let alpha = self.alpha(path, desc.roughness.as_ref(), desc.alpha.as_ref())?;
         let facets = facets(desc.distribution, desc.multiscatter);
         if facets == Facets::Ggx {
             return Ok(PlasticCoat::Ggx(CoatInput::new(ior, alpha)));
         }
-        let (RangedInput::Constant(ior), [ScalarInput::Constant(u), ScalarInput::Constant(v)]) = (ior, alpha.axes) else {
-            let message = "with a `distribution` or without `multiscatter`, `ior`, `roughness` and `alpha` cannot come from textures";
+        let (RangedInput::Constant(ior), [ScalarInput::Constant(u), ScalarInput::Constant(v)]) = (ior, alpha.axes)
+        else {
+            let message = "with a `distribution` or without `multiscatter`, `ior`, `roughness` and `alpha` cannot come \
+                           from textures";
             return Err(self.files.error(path, message));
         };
         if u != v {
-            let message = "with a `distribution` or without `multiscatter`, the roughness must be the same along both axes";
+            let message =
+                "with a `distribution` or without `multiscatter`, the roughness must be the same along both axes";
             return Err(self.files.error(path, message));
         }
         let alpha = [if alpha.squared { u * u } else { u }; 2];
@@ -245,14 +279,21 @@ impl Compiler<'_> {
             Facets::Ggx | Facets::SingleGgx => {
                 PlasticCoat::Ggx(CoatInput::Constant(Coat::single_scattering(ior, Ggx::new(alpha), diffuse_mean)))
             }
-            Facets::SeparableGgx => PlasticCoat::SeparableGgx(Coat::single_scattering(ior, SeparableGgx::new(alpha), mitsuba_diffuse_mean)),
-            Facets::Beckmann => PlasticCoat::Beckmann(Coat::single_scattering(ior, Beckmann::new(alpha), mitsuba_diffuse_mean)),
+            Facets::SeparableGgx => {
+                PlasticCoat::SeparableGgx(Coat::single_scattering(ior, SeparableGgx::new(alpha), mitsuba_diffuse_mean))
+            }
+            Facets::Beckmann => {
+                PlasticCoat::Beckmann(Coat::single_scattering(ior, Beckmann::new(alpha), mitsuba_diffuse_mean))
+            }
         })
     }
 
     /// Factors on what glass reflects and on what crosses it.
     fn tints(&self, path: &str, reflection: &ColorDesc, transmission: &ColorDesc) -> Result<[ColorInput; 2]> {
-        Ok([self.color(&format!("{path}.reflection_tint"), reflection)?, self.color(&format!("{path}.transmission_tint"), transmission)?])
+        Ok([
+            self.color(&format!("{path}.reflection_tint"), reflection)?,
+            self.color(&format!("{path}.transmission_tint"), transmission)?,
+        ])
     }
 
     pub(super) fn color(&self, path: &str, desc: &ColorDesc) -> Result<ColorInput> {
@@ -266,7 +307,9 @@ impl Compiler<'_> {
     /// A number within `[0, 1]`.
     pub(super) fn scalar(&self, path: &str, desc: &ScalarDesc) -> Result<ScalarInput> {
         Ok(match desc {
-            ScalarDesc::Constant(value) => ScalarInput::Constant(self.files.within(path, f64::from(*value), 0.0, 1.0)? as f32),
+            ScalarDesc::Constant(value) => {
+                ScalarInput::Constant(self.files.within(path, f64::from(*value), 0.0, 1.0)? as f32)
+            }
             ScalarDesc::Texture { texture } => {
                 let id = self.textures.find(self.files, path, texture, TextureUse::Data)?;
                 match self.textures.get(id) {
@@ -283,22 +326,33 @@ impl Compiler<'_> {
         if let [ColorInput::Constant(x), ColorInput::Constant(y)] = inputs
             && (x + y).max_channel() > 1.0 + 1e-6
         {
-            let message =
-                format!("`{a}` and `{b}` must not exceed 1 together in any channel: a surface cannot scatter more than it receives");
+            let message = format!(
+                "`{a}` and `{b}` must not exceed 1 together in any channel: a surface cannot scatter more than it \
+                 receives"
+            );
             return Err(self.files.error(path, message));
         }
         Ok(inputs)
     }
 
-    fn metal(&self, path: &str, metal: Option<&str>, eta: Option<[f32; 3]>, k: Option<[f32; 3]>) -> Result<([f32; 3], [f32; 3])> {
+    fn metal(
+        &self,
+        path: &str,
+        metal: Option<&str>,
+        eta: Option<[f32; 3]>,
+        k: Option<[f32; 3]>,
+    ) -> Result<([f32; 3], [f32; 3])> {
         match (metal, eta, k) {
             (Some(name), None, None) => {
-                let unknown = || self.files.unknown(&format!("{path}.metal"), "metal", name, Metal::names(MetalNames::Steradian));
+                let unknown =
+                    || self.files.unknown(&format!("{path}.metal"), "metal", name, Metal::names(MetalNames::Steradian));
                 Metal::find(MetalNames::Steradian, name).map(|metal| (metal.eta, metal.k)).ok_or_else(unknown)
             }
             (None, Some(eta), Some(k)) => {
                 if !eta.iter().all(|&e| e > 0.0 && e.is_finite()) {
-                    return Err(self.files.error(&format!("{path}.eta"), format!("{eta:?} must be finite and above 0")));
+                    return Err(self
+                        .files
+                        .error(&format!("{path}.eta"), format!("{eta:?} must be finite and above 0")));
                 }
                 Ok((eta, self.files.emitted(&format!("{path}.k"), k)?))
             }
@@ -307,7 +361,12 @@ impl Compiler<'_> {
     }
 
     /// GGX alpha along u and v; zero for a smooth surface.
-    pub(super) fn alpha(&self, path: &str, roughness: Option<&RoughnessDesc>, alpha: Option<&RoughnessDesc>) -> Result<AlphaInput> {
+    pub(super) fn alpha(
+        &self,
+        path: &str,
+        roughness: Option<&RoughnessDesc>,
+        alpha: Option<&RoughnessDesc>,
+    ) -> Result<AlphaInput> {
         let (key, desc, squared) = match (roughness, alpha) {
             (None, None) => return Ok(AlphaInput { axes: [ScalarInput::Constant(0.0); 2], squared: false }),
             (Some(roughness), None) => ("roughness", roughness, true),
@@ -315,28 +374,37 @@ impl Compiler<'_> {
             (Some(_), Some(_)) => return Err(self.files.error(path, "give either `roughness` or `alpha`")),
         };
         let path = format!("{path}.{key}");
-        let constant = |value: f32| self.files.within(&path, f64::from(value), 0.0, 1.0).map(|value| ScalarInput::Constant(value as f32));
+        let constant = |value: f32| {
+            self.files.within(&path, f64::from(value), 0.0, 1.0).map(|value| ScalarInput::Constant(value as f32))
+        };
         let axes = match desc {
             RoughnessDesc::Isotropic(a) => [constant(*a)?; 2],
             RoughnessDesc::Anisotropic([u, v]) => [constant(*u)?, constant(*v)?],
-            RoughnessDesc::Texture { texture } => [self.scalar(&path, &ScalarDesc::Texture { texture: texture.clone() })?; 2],
-            RoughnessDesc::Axes { u, v } => [self.scalar(&format!("{path}.u"), u)?, self.scalar(&format!("{path}.v"), v)?],
+            RoughnessDesc::Texture { texture } => {
+                [self.scalar(&path, &ScalarDesc::Texture { texture: texture.clone() })?; 2]
+            }
+            RoughnessDesc::Axes { u, v } => {
+                [self.scalar(&format!("{path}.u"), u)?, self.scalar(&format!("{path}.v"), v)?]
+            }
         };
         Ok(AlphaInput { axes, squared })
     }
 
     /// The parameter `ior`, from `least` to 10.
     pub(super) fn ior(&self, path: &str, desc: &RangedDesc, least: f64) -> Result<RangedInput> {
-        self.ranged(&format!("{path}.ior"), desc, |path, ior| self.files.within(path, f64::from(ior), least, 10.0).map(|_| ()))
+        self.ranged(&format!("{path}.ior"), desc, |path, ior| {
+            self.files.within(path, f64::from(ior), least, 10.0).map(|_| ())
+        })
     }
 
     /// The index of refraction of what is inside of a dielectric.
     pub(super) fn glass_ior(&self, path: &str, desc: &RangedDesc) -> Result<f32> {
         match self.ior(path, desc, 0.1)? {
             RangedInput::Constant(ior) => Ok(ior),
-            RangedInput::Texture { .. } => {
-                Err(self.files.error(&format!("{path}.ior"), "cannot come from a texture: what is inside has one index of refraction"))
-            }
+            RangedInput::Texture { .. } => Err(self.files.error(
+                &format!("{path}.ior"),
+                "cannot come from a texture: what is inside has one index of refraction",
+            )),
         }
     }
 
@@ -367,108 +435,5 @@ fn facets(distribution: DistributionDesc, multiscatter: bool) -> Facets {
         DistributionDesc::GgxSeparable => Facets::SeparableGgx,
         DistributionDesc::Ggx if multiscatter => Facets::Ggx,
         DistributionDesc::Ggx => Facets::SingleGgx,
-    }
-}
-
-/// What an MTL makes of a surface.
-pub struct MtlSurface {
-    pub material: Material,
-    /// Light given off, if not black.
-    pub radiance: Option<Rgb>,
-}
-
-/// The nearest material for an MTL: `illum` 5 is a mirror of colour Ks; 4, 6, 7 and 9 are glass of index Ni; a specular
-/// colour with an exponent has alpha = sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic
-/// otherwise; everything else is diffuse with Kd.
-///
-/// The error names the invalid number.
-pub fn from_mtl(mtl: &ObjMaterial) -> Result<MtlSurface, String> {
-    let fault = |key: &str, value: &dyn Debug, must: &str| Err(format!("material \"{}\": {key} {value:?} must be {must}", mtl.name));
-    for (key, color) in [("Kd", mtl.diffuse), ("Ks", mtl.specular)] {
-        if let Some(color) = color.filter(|c| !c.iter().all(|v| (0.0..=1.0).contains(v))) {
-            return fault(key, &color, "within 0 and 1");
-        }
-    }
-    if let Some(radiance) = mtl.emissive.filter(|c| !c.iter().all(|&v| v >= 0.0 && v.is_finite())) {
-        return fault("Ke", &radiance, "finite and not negative");
-    }
-    if let Some(exponent) = mtl.shininess.filter(|&n| !(n >= 0.0 && n.is_finite())) {
-        return fault("Ns", &exponent, "finite and not negative");
-    }
-    if let Some(opacity) = mtl.opacity.filter(|d| !(0.0..=1.0).contains(d)) {
-        return fault("d", &opacity, "within 0 and 1");
-    }
-    let diffuse = mtl.diffuse.map_or(Rgb::splat(0.5), Rgb::from);
-    let specular = mtl.specular.map_or(Rgb::BLACK, Rgb::from);
-    let ior = mtl.ior.filter(|&n| n > 1.0 && n <= 10.0).unwrap_or(1.5);
-    let is_glass = matches!(mtl.illumination, Some(4 | 6 | 7 | 9));
-    let material = if mtl.illumination == Some(5) {
-        Mirror { reflectance: if specular.is_black() { Rgb::WHITE } else { specular } }.into()
-    } else if is_glass {
-        Dielectric::new(ior, [0.0; 2]).into()
-    } else if let Some(exponent) = mtl.shininess.filter(|_| !specular.is_black()) {
-        let alpha = [(2.0 / (exponent + 2.0)).sqrt(); 2];
-        if diffuse.is_black() { metal_of_color(specular, alpha) } else { Plastic::new(diffuse, ior, alpha).into() }
-    } else {
-        Lambert { albedo: diffuse }.into()
-    };
-    Ok(MtlSurface { material, radiance: mtl.emissive.map(Rgb::from).filter(|radiance| !radiance.is_black()) })
-}
-
-/// A metal with the given reflectance at normal incidence: with a real part of 1, `r = k² / (4 + k²)`.
-fn metal_of_color(reflectance: Rgb, alpha: [f32; 2]) -> Material {
-    let k = reflectance.map(|r| {
-        let r = r.min(0.9999);
-        2.0 * (r / (1.0 - r)).sqrt()
-    });
-    Conductor::new(Rgb::WHITE, k, alpha, Rgb::WHITE).into()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::bsdf::Bsdf;
-    use crate::math::Vec3;
-
-    fn bsdf(mtl: ObjMaterial) -> Bsdf {
-        match from_mtl(&mtl).unwrap().material {
-            Material::Constant(bsdf) => bsdf,
-            other => panic!("{other:?}"),
-        }
-    }
-
-    #[test]
-    fn an_mtl_becomes_the_nearest_material() {
-        let plain = ObjMaterial { diffuse: Some([0.1, 0.2, 0.3]), ..ObjMaterial::default() };
-        assert_eq!(bsdf(plain.clone()), Bsdf::Lambert(Lambert { albedo: Rgb::new(0.1, 0.2, 0.3) }));
-        assert_eq!(bsdf(ObjMaterial::default()), Bsdf::Lambert(Lambert { albedo: Rgb::splat(0.5) }));
-        let mirror = ObjMaterial { illumination: Some(5), specular: Some([0.9; 3]), ..plain.clone() };
-        assert_eq!(bsdf(mirror), Bsdf::Mirror(Mirror { reflectance: Rgb::splat(0.9) }));
-        let glass = ObjMaterial { illumination: Some(7), ior: Some(1.33), ..plain.clone() };
-        assert_eq!(bsdf(glass), Bsdf::Dielectric(Dielectric::new(1.33, [0.0; 2])));
-        let shiny = ObjMaterial { specular: Some([0.5; 3]), shininess: Some(48.0), ..plain.clone() };
-        assert_eq!(bsdf(shiny), Bsdf::Plastic(Plastic::new(Rgb::new(0.1, 0.2, 0.3), 1.5, [0.2; 2])));
-        let glowing = from_mtl(&ObjMaterial { emissive: Some([1.0, 2.0, 3.0]), ..plain }).unwrap();
-        assert_eq!(glowing.radiance, Some(Rgb::new(1.0, 2.0, 3.0)));
-    }
-
-    #[test]
-    fn a_metal_has_the_colour_it_was_given() {
-        let color = Rgb::new(0.9, 0.5, 0.1);
-        let Material::Constant(metal) = metal_of_color(color, [0.0; 2]) else { panic!("varies") };
-        let weight = metal.sample(Vec3::Z, 0.5, [0.5; 2]).unwrap().weight;
-        assert!([weight.r - color.r, weight.g - color.g, weight.b - color.b].iter().all(|d| d.abs() < 1e-5), "{weight:?}");
-    }
-
-    #[test]
-    fn numbers_out_of_range_are_named() {
-        let bad = |mtl: ObjMaterial| from_mtl(&ObjMaterial { name: "m".into(), ..mtl }).err().unwrap();
-        let none = ObjMaterial::default;
-        assert!(bad(ObjMaterial { diffuse: Some([0.0, 1.5, 0.0]), ..none() }).contains("\"m\": Kd"));
-        assert!(bad(ObjMaterial { specular: Some([f32::NAN; 3]), ..none() }).contains("Ks"));
-        assert!(bad(ObjMaterial { emissive: Some([-1.0; 3]), ..none() }).contains("Ke"));
-        assert!(bad(ObjMaterial { shininess: Some(f32::INFINITY), ..none() }).contains("Ns"));
-        assert!(bad(ObjMaterial { opacity: Some(1.5), ..none() }).contains("\"m\": d"));
-        assert!(bad(ObjMaterial { opacity: Some(f32::NAN), ..none() }).contains("\"m\": d"));
     }
 }

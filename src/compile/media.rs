@@ -24,12 +24,15 @@ impl Compiler<'_> {
                 self.files.within(&path, f64::from(abbe), 1.0, 1000.0)?;
                 let iors = dispersed(ior, abbe);
                 if iors.iter().any(|n| !(0.1..=10.0).contains(n)) {
-                    return Err(self.files.error(&path, format!("gives indices of refraction from {} to {}", iors[0], iors[2])));
+                    return Err(self
+                        .files
+                        .error(&path, format!("gives indices of refraction from {} to {}", iors[0], iors[2])));
                 }
                 iors
             }
         };
-        let absorption = glass.absorption.map_or(Ok(Rgb::BLACK), |a| self.absorption(&format!("{path}.absorption"), &a))?;
+        let absorption =
+            glass.absorption.map_or(Ok(Rgb::BLACK), |a| self.absorption(&format!("{path}.absorption"), &a))?;
         Ok(Some(Medium { priority: glass.priority.unwrap_or(0), ior, absorption }))
     }
 
@@ -56,12 +59,18 @@ impl MaterialTable {
     }
 
     /// The medium of a material that consists of others: whatever crosses its surface must end up in the same.
-    pub(super) fn medium_within(&self, files: &CompileContext, path: &str, material: &Material) -> Result<Option<Medium>> {
+    pub(super) fn medium_within(
+        &self,
+        files: &CompileContext,
+        path: &str,
+        material: &Material,
+    ) -> Result<Option<Medium>> {
         let Some(parts) = material.parts() else { return Ok(None) };
         let medium = |id: MaterialId| self.medium_of.get(&id).copied();
         match parts.map(|id| self.transmits(id)) {
             [true, true] if medium(parts[0]) != medium(parts[1]) => {
-                let message = "both materials let light through, but not into the same medium: they differ in `ior`, `priority`, `absorption` or `abbe`";
+                let message = "both materials let light through, but not into the same medium: they differ in `ior`, \
+                               `priority`, `absorption` or `abbe`";
                 Err(files.error(path, message))
             }
             [true, _] => Ok(medium(parts[0])),

@@ -38,7 +38,8 @@ impl MeshStore {
         });
         let meshes: Vec<(String, &MeshDesc)> = meshes.collect();
         let attributes = desc.attribute_names(used);
-        let loaded = meshes.into_par_iter().map(|(path, mesh)| (path.clone(), load(files, &path, mesh, &attributes))).collect();
+        let loaded =
+            meshes.into_par_iter().map(|(path, mesh)| (path.clone(), load(files, &path, mesh, &attributes))).collect();
         Self { loaded, attributes }
     }
 
@@ -67,7 +68,9 @@ fn load(files: &CompileContext, path: &str, desc: &MeshDesc, attributes: &BTreeS
             for (i, file) in desc.deform_files.iter().enumerate() {
                 let place = format!("{path}.deform_files[{i}]");
                 let later = load_file(files, &place, file, desc.material.is_none(), &BTreeSet::new())?;
-                if later.len() != meshes.len() || meshes.iter().zip(&later).any(|(a, b)| a.data.triangles != b.data.triangles) {
+                if later.len() != meshes.len()
+                    || meshes.iter().zip(&later).any(|(a, b)| a.data.triangles != b.data.triangles)
+                {
                     return Err(files.error(&place, "the triangles are not those of `file`: only positions may differ"));
                 }
                 for (mesh, later) in meshes.iter_mut().zip(later) {
@@ -95,7 +98,8 @@ fn load(files: &CompileContext, path: &str, desc: &MeshDesc, attributes: &BTreeS
         }
         _ => Err(files.error(
             path,
-            "a mesh needs either `file`, or `positions` and `triangles` (with optional `normals`, `uvs`, `colors` and `attributes`)",
+            "a mesh needs either `file`, or `positions` and `triangles` (with optional `normals`, `uvs`, `colors` and \
+             `attributes`)",
         )),
     }
 }
@@ -136,9 +140,8 @@ fn load_file(
     let extension = asset.extension().map(|e| e.to_string_lossy().to_lowercase());
     let loaded = match extension.as_deref() {
         Some("ply") => assets::read_ply_attributes(&asset, Some(attributes)).map(|data| vec![plain(data, None)]),
-        Some("obj") => {
-            assets::read_obj(&asset, with_materials).map(|meshes| meshes.into_iter().map(|mesh| plain(mesh.mesh, mesh.material)).collect())
-        }
+        Some("obj") => assets::read_obj(&asset, with_materials)
+            .map(|meshes| meshes.into_iter().map(|mesh| plain(mesh.mesh, mesh.material)).collect()),
         _ => Err(AssetError::Malformed("meshes are .obj or .ply files".into())),
     };
     loaded.map_err(|e| files.asset_error(place, &asset, e))
@@ -162,24 +165,37 @@ pub struct Placement<'a> {
 /// The error about a mesh, in its file if it has one.
 pub fn refusal(files: &CompileContext, path: &str, file: Option<&str>, message: String) -> Error {
     match file {
-        Some(file) => files.asset_error(&format!("{path}.file"), &files.source.asset(file), AssetError::Malformed(message)),
+        Some(file) => {
+            files.asset_error(&format!("{path}.file"), &files.source.asset(file), AssetError::Malformed(message))
+        }
         None => files.error(path, message),
     }
 }
 
-/// Moves a mesh to its place and checks it. A mirrored mesh is wound the other way round, so that its front stays the
-/// front. Triangles without area are dropped with a warning. `None`, with a warning too, if no triangles are left.
-pub fn place(files: &CompileContext, path: &str, data: MeshData, later: Vec<MeshData>, placement: Placement) -> Result<Option<Mesh>> {
-    let refuse = |error: MeshError| refusal(files, path, placement.file, error.to_string());
+/// Checks that lists are as long as others require.
+fn check_counts(data: &MeshData) -> Result<(), String> {
     let count = data.positions.len();
-    if let Some((triangle, index)) = out_of_range(&data) {
-        return Err(refuse(MeshError::Index { triangle, index, count }));
+    if let Some((triangle, index)) = out_of_range(data) {
+        return Err(MeshError::Index { triangle, index, count }.to_string());
     }
     if let Some(uvs) = data.uvs.as_ref().filter(|uvs| uvs.len() != count) {
-        return Err(refuse(MeshError::Count { what: "uvs", count: uvs.len(), vertices: count }));
+        return Err(MeshError::Count { what: "uvs", count: uvs.len(), vertices: count }.to_string());
     }
     attributes::check_counts(&data.attributes, count, data.triangles.len())
-        .map_err(|message| refusal(files, path, placement.file, message))?;
+}
+
+/// Moves a mesh to its place and checks it. A mirrored mesh is wound the other way round, so that its front stays the
+/// front. Triangles without area are dropped with a warning. `None`, with a warning too, if no triangles are left.
+pub fn place(
+    files: &CompileContext,
+    path: &str,
+    data: MeshData,
+    later: Vec<MeshData>,
+    placement: Placement,
+) -> Result<Option<Mesh>> {
+    let refuse = |error: MeshError| refusal(files, path, placement.file, error.to_string());
+    let count = data.positions.len();
+    check_counts(&data).map_err(|message| refusal(files, path, placement.file, message))?;
     let transform = placement.transform;
     let is_identity = *transform == Transform::IDENTITY;
     let place_positions = |mut positions: Vec<[f32; 3]>, origin: [f64; 3]| {
@@ -209,7 +225,11 @@ pub fn place(files: &CompileContext, path: &str, data: MeshData, later: Vec<Mesh
     let mut steps = vec![MeshStep { positions, normals: data.normals }];
     for step in later {
         if step.positions.len() != count {
-            return Err(refuse(MeshError::Count { what: "positions at a later time", count: step.positions.len(), vertices: count }));
+            return Err(refuse(MeshError::Count {
+                what: "positions at a later time",
+                count: step.positions.len(),
+                vertices: count,
+            }));
         }
         steps.push(MeshStep { positions: place_positions(step.positions, step.origin), normals: step.normals });
     }
@@ -290,8 +310,11 @@ impl Faces {
         self.retain(has_area);
         let dropped = before - self.triangles.len();
         if self.triangles.is_empty() {
-            let why =
-                if before == 0 { "the mesh has no triangles".into() } else { format!("all {before} triangles of the mesh have no area") };
+            let why = if before == 0 {
+                "the mesh has no triangles".into()
+            } else {
+                format!("all {before} triangles of the mesh have no area")
+            };
             files.warn(path, format_args!("{why}: the shape is skipped"));
         } else if dropped > 0 {
             files.warn(path, format_args!("{dropped} of {before} triangles have no area and were dropped"));
@@ -314,8 +337,8 @@ impl Faces {
         if dropped > 0 {
             let file = files.source.file.display();
             tracing::warn!(
-                "{file}: {path}: {dropped} of {before} triangles lie where others of the emitter do and were dropped (for both sides: \
-                 emission.two_sided)"
+                "{file}: {path}: {dropped} of {before} triangles lie where others of the emitter do and were dropped \
+                 (for both sides: emission.two_sided)"
             );
         }
     }

@@ -184,7 +184,10 @@ impl Builder {
         let files = &self.files;
         if !self.space.is_world() {
             self.materials.media.rescale(1.0 / self.space.scale());
-            self.materials.normal_perturbations.iter_mut().for_each(|normal_perturbation| normal_perturbation.rescale(self.space.scale()));
+            self.materials
+                .normal_perturbations
+                .iter_mut()
+                .for_each(|normal_perturbation| normal_perturbation.rescale(self.space.scale()));
         }
         self.geometry.cutouts = opacity::cutouts(&self.geometry.shapes, &self.opacities, &self.materials.textures);
         let light_groups = self.lights.groups();
@@ -194,13 +197,14 @@ impl Builder {
             files.refuse_own("shapes", "there is nothing to see: no shapes, no instances and no environment")?;
         }
         if !lights.shines() && needs_light(&desc.integrator) {
-            let message = "the scene has no light: give a shape an `emission`, or add an environment, point, spot or directional light";
+            let message = "the scene has no light: give a shape an `emission`, or add an environment, point, spot or \
+                           directional light";
             files.refuse_own("lights", message)?;
         }
         let part_normal_perturbations = self.materials.part_normal_perturbations();
         let materials = self.materials.materials;
-        let normal_perturbations =
-            !part_normal_perturbations.is_empty() || self.surfaces.iter().any(|surface| surface.normal_perturbation.is_some());
+        let normal_perturbations = !part_normal_perturbations.is_empty()
+            || self.surfaces.iter().any(|surface| surface.normal_perturbation.is_some());
         let anisotropic = materials.iter().any(|material| material.flags().is_anisotropic());
         let smooth = |shape: &Shape| matches!(shape, Shape::Mesh(mesh) if mesh.has_normals());
         let features = SceneFeatures {

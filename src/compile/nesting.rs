@@ -37,7 +37,9 @@ impl<'a> Nesting<'a> {
             placed = placed.saturating_add(extent.placed);
         }
         if placed > MAX_PLACED {
-            return Err(files.error("instances", format!("with those inside of objects they are more than {MAX_PLACED}")));
+            return Err(
+                files.error("instances", format!("with those inside of objects they are more than {MAX_PLACED}"))
+            );
         }
         for name in desc.objects.keys() {
             nesting.visit(files, desc, name, &format!("objects.{name}"), &mut Vec::new())?;

@@ -32,7 +32,12 @@ impl MaterialTable {
 
 impl Compiler<'_> {
     /// The normal or bump map of a material of the type `relief`.
-    pub(super) fn normal_perturbation(&self, desc: &SceneDesc, path: &str, material: &MaterialDesc) -> Result<Option<NormalPerturbation>> {
+    pub(super) fn normal_perturbation(
+        &self,
+        desc: &SceneDesc,
+        path: &str,
+        material: &MaterialDesc,
+    ) -> Result<Option<NormalPerturbation>> {
         let MaterialDesc::Relief { normal_map, bump_map, .. } = material else { return Ok(None) };
         Ok(Some(match (normal_map, bump_map) {
             (Some(map), None) => self.normal_map(desc, &format!("{path}.normal_map"), map)?,
@@ -45,14 +50,17 @@ impl Compiler<'_> {
         let place = format!("{path}.texture");
         let texture = self.textures.find_by_uv(self.files, &place, &map.texture, TextureUse::Data)?;
         if let Some(TextureDesc::Image { color_space: ColorSpaceDesc::Srgb, .. }) = desc.textures.get(&map.texture) {
-            return Err(self.files.error(&place, format!("the `color_space` of \"{}\" is `srgb`, but normals are data", map.texture)));
+            return Err(self
+                .files
+                .error(&place, format!("the `color_space` of \"{}\" is `srgb`, but normals are data", map.texture)));
         }
         self.files.within(&format!("{path}.strength"), f64::from(map.strength), 0.0, 16.0)?;
         Ok(NormalPerturbation::normal_map(texture, map.strength, map.flip_y, &self.textures.textures))
     }
 
     fn bump_map(&self, path: &str, map: &BumpMapDesc) -> Result<NormalPerturbation> {
-        let texture = self.textures.find_by_uv(self.files, &format!("{path}.texture"), &map.texture, TextureUse::Data)?;
+        let texture =
+            self.textures.find_by_uv(self.files, &format!("{path}.texture"), &map.texture, TextureUse::Data)?;
         if !map.height.is_finite() {
             return Err(self.files.error(&format!("{path}.height"), "is not finite"));
         }

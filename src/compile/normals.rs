@@ -67,7 +67,12 @@ fn shared_vertices(positions: &[[f32; 3]], by: SmoothByDesc) -> Vec<usize> {
 }
 
 /// Normals of the vertices, without creases. Vertices that count as the same share their normal.
-pub fn smooth(positions: &[[f32; 3]], triangles: &[[u32; 3]], weight: NormalWeightDesc, by: SmoothByDesc) -> Vec<[f32; 3]> {
+pub fn smooth(
+    positions: &[[f32; 3]],
+    triangles: &[[u32; 3]],
+    weight: NormalWeightDesc,
+    by: SmoothByDesc,
+) -> Vec<[f32; 3]> {
     let shared = shared_vertices(positions, by);
     let mut sums = vec![DVec3::ZERO; positions.len()];
     for (triangle, facet) in triangles.iter().zip(facets(positions, triangles, weight)) {
@@ -81,7 +86,13 @@ pub fn smooth(positions: &[[f32; 3]], triangles: &[[u32; 3]], weight: NormalWeig
 /// Splits a mesh at creases: at each corner the normal is averaged over the triangles around its vertex that differ
 /// from the corner's own by no more than the crease. `steps` has the positions at each time; the first ones decide
 /// where creases are.
-pub fn split(steps: &[&[[f32; 3]]], triangles: &[[u32; 3]], weight: NormalWeightDesc, by: SmoothByDesc, crease_cosine: f64) -> Split {
+pub fn split(
+    steps: &[&[[f32; 3]]],
+    triangles: &[[u32; 3]],
+    weight: NormalWeightDesc,
+    by: SmoothByDesc,
+    crease_cosine: f64,
+) -> Split {
     let shared = shared_vertices(steps[0], by);
     let by_step: Vec<Vec<Facet>> = steps.iter().map(|positions| facets(positions, triangles, weight)).collect();
     let mut around: HashMap<usize, Vec<(usize, usize)>> = HashMap::new();
@@ -91,7 +102,11 @@ pub fn split(steps: &[&[[f32; 3]]], triangles: &[[u32; 3]], weight: NormalWeight
         }
     }
 
-    let mut split = Split { vertices: Vec::new(), triangles: Vec::with_capacity(triangles.len()), normals: vec![Vec::new(); steps.len()] };
+    let mut split = Split {
+        vertices: Vec::new(),
+        triangles: Vec::with_capacity(triangles.len()),
+        normals: vec![Vec::new(); steps.len()],
+    };
     let mut known: HashMap<(u32, Vec<[u32; 3]>), u32> = HashMap::new();
     for (t, triangle) in triangles.iter().enumerate() {
         let corners = triangle.map(|vertex| {
@@ -143,9 +158,11 @@ mod tests {
         // area 1/2.
         let positions = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 1.0]];
         let triangles = [[0, 1, 2], [0, 3, 4]];
-        for (weight, [of_z, of_x]) in
-            [(NormalWeightDesc::Angle, [2.0, 1.0]), (NormalWeightDesc::Area, [4.0, 1.0]), (NormalWeightDesc::Uniform, [1.0, 1.0])]
-        {
+        for (weight, [of_z, of_x]) in [
+            (NormalWeightDesc::Angle, [2.0, 1.0]),
+            (NormalWeightDesc::Area, [4.0, 1.0]),
+            (NormalWeightDesc::Uniform, [1.0, 1.0]),
+        ] {
             let expected = Vec3::new(of_x, 0.0, of_z).normalize();
             let creased = split(&[&positions], &triangles, weight, SmoothByDesc::Position, -1.0);
             assert_eq!(creased.vertices[0], 0);
@@ -169,14 +186,26 @@ mod tests {
     #[test]
     fn a_crease_keeps_the_edges_of_a_cube_and_not_those_within_its_faces() {
         let cube = cube();
-        let flat = split(&[&cube.positions], &cube.triangles, NormalWeightDesc::Angle, SmoothByDesc::Position, 60f64.to_radians().cos());
+        let flat = split(
+            &[&cube.positions],
+            &cube.triangles,
+            NormalWeightDesc::Angle,
+            SmoothByDesc::Position,
+            60f64.to_radians().cos(),
+        );
         assert_eq!((flat.vertices.len(), flat.triangles.len()), (24, 12));
         for triangle in &flat.triangles {
             let corners = triangle.map(|i| Vec3::from(cube.positions[flat.vertices[i as usize] as usize]));
             let n = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
             assert!(triangle.iter().all(|&i| (Vec3::from(flat.normals[0][i as usize]) - n).length() < 1e-6));
         }
-        let round = split(&[&cube.positions], &cube.triangles, NormalWeightDesc::Angle, SmoothByDesc::Position, 100f64.to_radians().cos());
+        let round = split(
+            &[&cube.positions],
+            &cube.triangles,
+            NormalWeightDesc::Angle,
+            SmoothByDesc::Position,
+            100f64.to_radians().cos(),
+        );
         let smooth = smooth(&cube.positions, &cube.triangles, NormalWeightDesc::Angle, SmoothByDesc::Position);
         for (vertex, n) in round.vertices.iter().zip(&round.normals[0]) {
             assert!((Vec3::from(*n) - Vec3::from(smooth[*vertex as usize])).length() < 1e-6);
@@ -192,6 +221,9 @@ mod tests {
         let cos = 30f64.to_radians().cos();
         let split_roof = split(&[&open, &steep], &triangles, NormalWeightDesc::Angle, SmoothByDesc::Position, cos);
         assert_eq!((split_roof.vertices.len(), split_roof.normals.len()), (4, 2));
-        assert_eq!(split(&[&steep], &triangles, NormalWeightDesc::Angle, SmoothByDesc::Position, cos).vertices.len(), 6);
+        assert_eq!(
+            split(&[&steep], &triangles, NormalWeightDesc::Angle, SmoothByDesc::Position, cos).vertices.len(),
+            6
+        );
     }
 }

@@ -26,7 +26,8 @@ impl Builder {
     pub(super) fn add_world(&mut self, desc: &SceneDesc, used: &UsedNames) -> Result<()> {
         let (mut world, mut planes) = (Vec::with_capacity(desc.shapes.len()), Vec::new());
         for (i, shape) in desc.shapes.iter().enumerate() {
-            let prepared = self.prepare(&format!("shapes[{i}]"), i, shape, true)?.into_iter().map(|prepared| (i, prepared));
+            let prepared =
+                self.prepare(&format!("shapes[{i}]"), i, shape, true)?.into_iter().map(|prepared| (i, prepared));
             let (endless, others): (Vec<_>, Vec<_>) = prepared.partition(|(_, prepared)| prepared.is_plane());
             planes.extend(endless);
             world.extend(others);
@@ -68,7 +69,8 @@ impl Builder {
         self.surroundings = self.surroundings.transformed(&self.space.from_world());
         let bounds = self.geometry.bounds();
         if !bounds.is_empty() {
-            self.surroundings = self.surroundings.union(&Bounds { min: bounds.min.as_dvec3(), max: bounds.max.as_dvec3() });
+            self.surroundings =
+                self.surroundings.union(&Bounds { min: bounds.min.as_dvec3(), max: bounds.max.as_dvec3() });
         }
         for (_, plane) in planes {
             let id = self.place(plane, &DAffine3::IDENTITY, &{ self.space })?;
@@ -96,7 +98,8 @@ impl Builder {
         let largest = bounds.iter().map(|b| b.min.abs().max(b.max.abs()).max_element()).fold(0.0, f64::max);
         let least = RenderSpace::EXTENTS[0];
         if largest > 0.0 && largest < least {
-            let message = format!("the scene reaches only {largest:e} from the origin: at least {least:e} can be rendered");
+            let message =
+                format!("the scene reaches only {largest:e} from the origin: at least {least:e} can be rendered");
             return Err(self.files.error("shapes", message));
         }
         Ok(RenderSpace::around(&bounds))
@@ -139,13 +142,17 @@ impl Builder {
 
     /// Where an instance stands in the world.
     fn instance_motion(&self, level: &Level, path: &str, instance: &InstanceDesc) -> Result<Motion> {
-        let map = self.files.transform(&format!("{path}.transform"), &instance.transform, &DAffine3::IDENTITY)?.world_from_object;
+        let map = self
+            .files
+            .transform(&format!("{path}.transform"), &instance.transform, &DAffine3::IDENTITY)?
+            .world_from_object;
         Ok(level.outer.after(&self.files.motion(&format!("{path}.motion"), &instance.motion, &map, self.shutter)?))
     }
 
     /// The shapes of an object: what neither emits nor moves goes into a group for all instances.
     fn share(&mut self, shapes: Vec<PreparedShape>) -> Result<PreparedObject> {
-        let (emitters, others): (Vec<_>, Vec<_>) = shapes.into_iter().partition(|shape| shape.surface.emission.is_some());
+        let (emitters, others): (Vec<_>, Vec<_>) =
+            shapes.into_iter().partition(|shape| shape.surface.emission.is_some());
         let (moving, resting): (Vec<_>, Vec<_>) = others.into_iter().partition(|shape| shape.motion.is_some());
         let shared = self.group(resting)?;
         let mut movers = Vec::new();
@@ -175,11 +182,18 @@ impl Builder {
         Ok(Some(ObjectId::new(self.geometry.objects.len() - 1)))
     }
 
-    fn push_instance(&mut self, path: &str, object: ObjectId, motion: &Motion, placement: Option<PlacementId>) -> Result<()> {
+    fn push_instance(
+        &mut self,
+        path: &str,
+        object: ObjectId,
+        motion: &Motion,
+        placement: Option<PlacementId>,
+    ) -> Result<()> {
         let motion = self.space.place_motion(&self.object_spaces[object.index()].place_within(motion));
         let instance = Instance::moving(object, motion).ok_or_else(|| self.files.error(path, super::SINGULAR))?;
         if instance.motion.is_none() && instance.inverse_reach().is_none() {
-            let message = "scales the object so much, up or down, that the inverse is out of the range of 32-bit numbers";
+            let message =
+                "scales the object so much, up or down, that the inverse is out of the range of 32-bit numbers";
             return Err(self.files.error(path, message));
         }
         self.geometry.instances.push(instance);
@@ -188,7 +202,12 @@ impl Builder {
     }
 
     /// Adds instances and those inside of them; [`Nesting`] has checked that this ends.
-    fn add_instances(&mut self, level: &Level, objects: &BTreeMap<&str, PreparedObject>, instances: &[InstanceDesc]) -> Result<()> {
+    fn add_instances(
+        &mut self,
+        level: &Level,
+        objects: &BTreeMap<&str, PreparedObject>,
+        instances: &[InstanceDesc],
+    ) -> Result<()> {
         for (i, instance) in instances.iter().enumerate() {
             let name = instance.object.as_str();
             let (Some(inner), Some(object)) = (level.desc.objects.get(name), objects.get(name)) else {
@@ -209,7 +228,8 @@ impl Builder {
             }
             for emitter in &object.emitters {
                 let outer = outer.as_constant().ok_or_else(|| {
-                    self.files.error(&format!("{path}.motion"), format!("object \"{name}\" gives off light and cannot move"))
+                    self.files
+                        .error(&format!("{path}.motion"), format!("object \"{name}\" gives off light and cannot move"))
                 })?;
                 let mut emitter = emitter.clone();
                 emitter.surface.identity.placement = placement;

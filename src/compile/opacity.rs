@@ -37,12 +37,14 @@ impl Builder {
                 let id = alpha.map_or(named, |bitmap| textures.push(Texture::Bitmap(bitmap)));
                 let [min, max] = textures.get(id).range();
                 if !(min >= 0.0 && max <= 1.0) {
-                    return Err(self
-                        .files
-                        .error(&place, format!("the texture \"{name}\" reaches from {min} to {max}, opacity from 0 to 1")));
+                    return Err(self.files.error(
+                        &place,
+                        format!("the texture \"{name}\" reaches from {min} to {max}, opacity from 0 to 1"),
+                    ));
                 }
                 let Some(threshold) = threshold else { return Ok(Some(id)) };
-                let threshold = self.files.within(&format!("{path}.threshold"), f64::from(*threshold), 0.0, 1.0)? as f32;
+                let threshold =
+                    self.files.within(&format!("{path}.threshold"), f64::from(*threshold), 0.0, 1.0)? as f32;
                 let step = Texture::Step(Box::new(textures.get(id).clone()), threshold);
                 Some(textures.push(step))
             }

@@ -30,9 +30,10 @@ pub(super) fn compile(files: &CompileContext, path: &str, desc: &PlaneDesc, comm
         return Err(files.error(&format!("{path}.motion"), "a plane cannot move; use a quad"));
     }
     if path.starts_with("objects.") {
-        return Err(
-            files.error(path, "a plane cannot be part of an object, whose instances have bounds; put it into the `shapes` of the scene")
-        );
+        return Err(files.error(
+            path,
+            "a plane cannot be part of an object, whose instances have bounds; put it into the `shapes` of the scene",
+        ));
     }
     let point = files.vector(&format!("{path}.point"), desc.point)?;
     Ok(Plane { point, normal: files.direction(&format!("{path}.normal"), desc.normal)? })
@@ -42,7 +43,8 @@ pub(super) fn compile(files: &CompileContext, path: &str, desc: &PlaneDesc, comm
 /// space. `map` is regular; `None` if the numbers become too large.
 pub(super) fn square(plane: &Plane, map: &DAffine3, surroundings: &Bounds) -> Option<Quad> {
     let Plane { point, normal } = *plane;
-    let (center, radius) = (0.5 * (surroundings.min + surroundings.max), 0.5 * (surroundings.max - surroundings.min).length());
+    let (center, radius) =
+        (0.5 * (surroundings.min + surroundings.max), 0.5 * (surroundings.max - surroundings.min).length());
     let axis = if normal.x.abs() > 0.1 { DVec3::Y } else { DVec3::X };
     let u = axis.cross(normal).normalize();
     let v = normal.cross(u);

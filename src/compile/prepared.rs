@@ -103,7 +103,13 @@ impl PreparedShape {
 impl Builder {
     /// Loads and checks one shape of the scene file, that with this number of its list; an OBJ file may contain
     /// several. Where it is not used, its files are not read.
-    pub(super) fn prepare(&mut self, path: &str, number: usize, desc: &ShapeDesc, is_used: bool) -> Result<Vec<PreparedShape>> {
+    pub(super) fn prepare(
+        &mut self,
+        path: &str,
+        number: usize,
+        desc: &ShapeDesc,
+        is_used: bool,
+    ) -> Result<Vec<PreparedShape>> {
         let common = desc.common();
         let identity = self.identities.shape(&self.files, number, desc);
         let mut binding = self.materials.find(&self.files, path, common.material)?;
@@ -123,7 +129,8 @@ impl Builder {
         let form = match desc {
             ShapeDesc::Mesh(mesh) if !is_used && mesh.file.is_some() => {
                 self.smoothing(path, mesh)?;
-                let later = mesh.deform_files.iter().enumerate().map(|(i, file)| (format!("{path}.deform_files[{i}]"), file));
+                let later =
+                    mesh.deform_files.iter().enumerate().map(|(i, file)| (format!("{path}.deform_files[{i}]"), file));
                 for (path, file) in mesh.file.iter().map(|file| (format!("{path}.file"), file)).chain(later) {
                     self.files.warn_of_missing(&path, file);
                 }
@@ -203,7 +210,9 @@ impl Builder {
 
     fn smoothing(&self, path: &str, desc: &MeshDesc) -> Result<Smoothing> {
         let crease = desc.crease_angle_degrees;
-        let crease = crease.map(|angle| self.files.within(&format!("{path}.crease_angle_degrees"), angle, 0.0, 180.0)).transpose()?;
+        let crease = crease
+            .map(|angle| self.files.within(&format!("{path}.crease_angle_degrees"), angle, 0.0, 180.0))
+            .transpose()?;
         // A rounding must not make creases where triangles are coplanar or the angle is that of all edges.
         let crease_cosine = crease.filter(|&angle| angle < 180.0).map(|angle| angle.to_radians().cos() - 1e-6);
         Ok(Smoothing { weight: desc.normal_weight, crease_cosine, by: desc.smooth_by })
@@ -239,53 +248,76 @@ impl Builder {
         let size = f64::from(bounds.size().max_element());
         if matches!(shape, Shape::Mesh(_)) && size > 0.0 && size < SMALLEST_MESH {
             let [size, least] = [size, SMALLEST_MESH].map(|length| space.world_length(length));
-            let message = format!("the mesh measures {size:e}: beside the rest of the scene, at least {least:e} can be rendered");
+            let message =
+                format!("the mesh measures {size:e}: beside the rest of the scene, at least {least:e} can be rendered");
             return Err(self.files.error(path, message));
         }
         Ok(())
     }
 
-    /// Adds a shape to the scene, placed by its own transform, by `outer` and into `space`; `None` if it is a mesh of
-    /// which nothing has an area. One that emits must end up in the world's.
-    pub(super) fn place(&mut self, prepared: PreparedShape, outer: &DAffine3, space: &RenderSpace) -> Result<Option<ShapeId>> {
-        let PreparedShape { form, map, motion, reverse_normal, surface: PreparedSurface { binding, emission, identity }, path } = prepared;
-        // What moves is placed by its instance.
-        let map = if motion.is_some() { DAffine3::IDENTITY } else { map };
-        let transform =
-            Transform::new(space.place(&(*outer * map))).ok_or_else(|| self.files.error(&format!("{path}.transform"), super::SINGULAR))?;
+    /// A shape by its transform into the scene; `None` if it is a mesh of which nothing has an area.
+    fn placed_form(
+        &self,
+        form: ShapeSource,
+        transform: &Transform,
+        reverse_normal: bool,
+        surface: &PreparedSurface,
+        path: &str,
+    ) -> Result<Option<Shape>> {
         let analytic = |surface: Analytic| {
-            let mut placed = TransformedShape::new(surface, transform);
+            let mut placed = TransformedShape::new(surface, *transform);
             placed.reverse_normal = reverse_normal;
             Shape::Analytic(placed)
         };
-        let shape = match form {
+        Ok(Some(match form {
             ShapeSource::Analytic(surface) => analytic(surface),
             ShapeSource::Plane(plane) => {
                 let quad = planes::square(&plane, &transform.world_from_object, &self.surroundings);
-                analytic(Analytic::Quad(quad.ok_or_else(|| self.files.error(&path, TOO_LARGE))?))
+                analytic(Analytic::Quad(quad.ok_or_else(|| self.files.error(path, TOO_LARGE))?))
             }
             ShapeSource::Mesh { data, shading, smoothing, later, file } => {
                 let placement = meshes::Placement {
                     file: file.as_deref(),
-                    transform: &transform,
+                    transform,
                     shading,
                     smoothing,
                     reverse_normal,
-                    emits: emission.is_some(),
+                    emits: surface.emission.is_some(),
                     attributes: &self.materials.textures.attributes,
                 };
-                let Some(mesh) = meshes::place(&self.files, &path, data, later, placement)? else {
+                let Some(mesh) = meshes::place(&self.files, path, data, later, placement)? else {
                     return Ok(None);
                 };
-                Shape::Mesh(if self.materials.has_normal_map(&binding) { mesh.with_tangents() } else { mesh })
+                Shape::Mesh(if self.materials.has_normal_map(&surface.binding) { mesh.with_tangents() } else { mesh })
             }
+        }))
+    }
+
+    /// Adds a shape to the scene, placed by its own transform, by `outer` and into `space`; `None` if it is a mesh of
+    /// which nothing has an area. One that emits must end up in the world's.
+    pub(super) fn place(
+        &mut self,
+        prepared: PreparedShape,
+        outer: &DAffine3,
+        space: &RenderSpace,
+    ) -> Result<Option<ShapeId>> {
+        let PreparedShape { form, map, motion, reverse_normal, surface, path } = prepared;
+        // What moves is placed by its instance.
+        let map = if motion.is_some() { DAffine3::IDENTITY } else { map };
+        let transform = Transform::new(space.place(&(*outer * map)))
+            .ok_or_else(|| self.files.error(&format!("{path}.transform"), super::SINGULAR))?;
+        let Some(shape) = self.placed_form(form, &transform, reverse_normal, &surface, &path)? else {
+            return Ok(None);
         };
         self.check_size(&path, &shape, space)?;
         self.geometry.shapes.push(shape);
+        let PreparedSurface { binding, emission, identity } = surface;
         let id = ShapeId::new(self.geometry.shapes.len() - 1);
         let medium = self.materials.medium(binding.material);
         if medium.is_some() && emission.is_some() {
-            return Err(self.files.error(&path, "the surface of a medium cannot give off light: it may turn out to be no boundary"));
+            return Err(self
+                .files
+                .error(&path, "the surface of a medium cannot give off light: it may turn out to be no boundary"));
         }
         let (material, normal_perturbation) = (binding.material, binding.normal_perturbation);
         let mut surface = Surface { material, normal_perturbation, medium, first_light: None, single_light: false };

@@ -36,12 +36,16 @@ impl Compiler<'_> {
         }
         macro_rules! inputs {
             ($($(#[doc = $doc:literal])* $(#[serde $serde:tt])? $name:ident: $kind:ident = $default:tt,)*) => {
-                PrincipledInputs { $($name: input!($kind desc.$name, &format!("{path}.{}", stringify!($name)), $default),)* }
+                PrincipledInputs {
+                    $($name: input!($kind desc.$name, &format!("{path}.{}", stringify!($name)), $default),)*
+                }
             };
         }
         let inputs = principled_parameters!(inputs);
         if !desc.thin && inputs.diffuse_transmission != ScalarInput::Constant(0.0) {
-            return Err(self.files.error(&format!("{path}.diffuse_transmission"), "needs `thin`: a solid has no other side here"));
+            return Err(self
+                .files
+                .error(&format!("{path}.diffuse_transmission"), "needs `thin`: a solid has no other side here"));
         }
         if !desc.thin && !inputs.transmission.is_zero() {
             let textured = [
@@ -49,7 +53,8 @@ impl Compiler<'_> {
                 ("ior", matches!(inputs.ior, RangedInput::Texture { .. })),
             ];
             if let Some((key, _)) = textured.into_iter().find(|(_, is_textured)| *is_textured) {
-                let message = "cannot come from a texture with `transmission`, unless `thin`: what is inside has one index of refraction";
+                let message = "cannot come from a texture with `transmission`, unless `thin`: what is inside has one \
+                               index of refraction";
                 return Err(self.files.error(&format!("{path}.{key}"), message));
             }
         }

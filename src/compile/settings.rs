@@ -50,7 +50,8 @@ pub(super) fn check(desc: &SceneDesc, files: &CompileContext) -> Result<Camera> 
         let path = format!("outputs[{i}]");
         check_output(files, &path, output)?;
         if let Some(first) = written.insert(output.file.as_str(), i) {
-            return Err(files.error(&format!("{path}.file"), format!("\"{}\" is the file of outputs[{first}] too", output.file)));
+            return Err(files
+                .error(&format!("{path}.file"), format!("\"{}\" is the file of outputs[{first}] too", output.file)));
         }
     }
     Ok(camera)
@@ -65,15 +66,21 @@ fn check_film(files: &CompileContext, film: &FilmDesc) -> Result<()> {
     if let Some([x, y, width, height]) = film.crop
         && !(Crop { x, y, width, height }).fits([film.width, film.height])
     {
-        let message = format!("[{x}, {y}, {width}, {height}] must have an area and lie within {} x {}", film.width, film.height);
+        let message =
+            format!("[{x}, {y}, {width}, {height}] must have an area and lie within {} x {}", film.width, film.height);
         return Err(files.error("film.crop", message));
     }
     let most = film.width.min(film.height);
     if film.overscan > most {
-        return Err(files.error("film.overscan", format!("must be at most the picture's shorter side, {most}, not {}", film.overscan)));
+        return Err(files.error(
+            "film.overscan",
+            format!("must be at most the picture's shorter side, {most}, not {}", film.overscan),
+        ));
     }
     if film.overscan > 0 && film.crop.is_some() {
-        return Err(files.error("film.overscan", "a crop leaves nothing around the picture: give one of `crop` and `overscan`"));
+        return Err(
+            files.error("film.overscan", "a crop leaves nothing around the picture: give one of `crop` and `overscan`")
+        );
     }
     match film.filter {
         FilterDesc::Gaussian { sigma, .. } => {
@@ -95,8 +102,12 @@ fn check_film(files: &CompileContext, film: &FilmDesc) -> Result<()> {
 
 fn check_integrator(files: &CompileContext, integrator: &IntegratorDesc) -> Result<()> {
     match *integrator {
-        IntegratorDesc::Path { max_depth: 0, .. } => return Err(files.error("integrator.max_depth", "must be at least 1")),
-        IntegratorDesc::Path { rr_depth: 0, .. } => return Err(files.error("integrator.rr_depth", "must be at least 1")),
+        IntegratorDesc::Path { max_depth: 0, .. } => {
+            return Err(files.error("integrator.max_depth", "must be at least 1"));
+        }
+        IntegratorDesc::Path { rr_depth: 0, .. } => {
+            return Err(files.error("integrator.rr_depth", "must be at least 1"));
+        }
         IntegratorDesc::Path { clamp: Some(clamp), .. } => {
             files.positive("integrator.clamp", f64::from(clamp))?;
         }

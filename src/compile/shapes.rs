@@ -15,10 +15,15 @@ pub fn compile(files: &CompileContext, path: &str, desc: &ShapeDesc) -> Result<O
         }
         ShapeDesc::Quad(q) => Quad::new(q.origin.into(), q.edge_u.into(), q.edge_v.into()).map(Analytic::Quad),
         ShapeDesc::Disk(d) => Disk::new(d.radius, d.inner_radius, d.phi_max_degrees.to_radians()).map(Analytic::Disk),
-        ShapeDesc::Cylinder(c) => Frustum::new(c.radius, c.radius, c.height, c.phi_max_degrees.to_radians()).map(Analytic::Frustum),
-        ShapeDesc::Cone(c) => Frustum::new(c.radius, c.top_radius, c.height, c.phi_max_degrees.to_radians()).map(Analytic::Frustum),
+        ShapeDesc::Cylinder(c) => {
+            Frustum::new(c.radius, c.radius, c.height, c.phi_max_degrees.to_radians()).map(Analytic::Frustum)
+        }
+        ShapeDesc::Cone(c) => {
+            Frustum::new(c.radius, c.top_radius, c.height, c.phi_max_degrees.to_radians()).map(Analytic::Frustum)
+        }
         ShapeDesc::Revolution(r) => {
-            let surface = profile(&r.profile).and_then(|profile| Revolution::new(&profile, r.phi_max_degrees.to_radians()));
+            let surface =
+                profile(&r.profile).and_then(|profile| Revolution::new(&profile, r.phi_max_degrees.to_radians()));
             surface.and_then(|surface| surface.with_parameter(parameter(r.v))).map(Analytic::Revolution)
         }
     };

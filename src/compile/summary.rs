@@ -86,8 +86,10 @@ impl Summary {
             light_groups: scene.light_groups.names().to_vec(),
             materials: scene.materials.len(),
             textures: scene.textures.iter().filter(|texture| !matches!(texture, Texture::Constant(_))).count(),
-            bounds: (!bounds.is_empty())
-                .then(|| [bounds.min, bounds.max].map(|p| scene.camera.render_space().world_point(p.as_dvec3()).as_vec3().to_array())),
+            bounds: (!bounds.is_empty()).then(|| {
+                [bounds.min, bounds.max]
+                    .map(|p| scene.camera.render_space().world_point(p.as_dvec3()).as_vec3().to_array())
+            }),
             geometry_bytes: geometry.memory_bytes(),
             features: features(scene),
         }

@@ -10,7 +10,10 @@ use super::CompileContext;
 use crate::assets::{AssetError, read_image};
 use crate::attribute::{VERTEX_COLOR, is_of_faces};
 use crate::color::Rgb;
-use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, SceneDesc, TextureDesc, TextureFilterDesc, UsedNames, WrapDesc, WrapModeDesc};
+use crate::desc::{
+    ChannelDesc, ColorDesc, ColorSpaceDesc, SceneDesc, TextureDesc, TextureFilterDesc, UsedNames, WrapDesc,
+    WrapModeDesc,
+};
 use crate::error::Result;
 use crate::id::{AttributeId, TextureId};
 use crate::image_data::{ImageData, Samples};
@@ -66,12 +69,18 @@ impl TextureTable {
         };
         for name in desc.textures.keys() {
             let place = format!("textures.{name}");
-            if let Some(TextureDesc::Image { file, .. }) = desc.textures.get(name).filter(|_| !used.textures.contains(name)) {
+            if let Some(TextureDesc::Image { file, .. }) =
+                desc.textures.get(name).filter(|_| !used.textures.contains(name))
+            {
                 files.warn_of_missing(&format!("{place}.file"), file);
             }
             let made = loader.named(&place, name, TextureUse::Color)?;
             let color = table.push(made.texture);
-            let data = if made.depends_on_use { table.push(loader.named(&place, name, TextureUse::Data)?.texture) } else { color };
+            let data = if made.depends_on_use {
+                table.push(loader.named(&place, name, TextureUse::Data)?.texture)
+            } else {
+                color
+            };
             table.names.insert(name.clone(), Entry { color, data });
         }
         (table.images, table.attributes) = (loader.images, loader.attributes);
@@ -91,7 +100,10 @@ impl TextureTable {
 
     /// The texture that `path` names.
     pub fn find(&self, files: &CompileContext, path: &str, name: &str, texture_use: TextureUse) -> Result<TextureId> {
-        let entry = self.names.get(name).ok_or_else(|| files.unknown(path, "texture", name, self.names.keys().map(String::as_str)))?;
+        let entry = self
+            .names
+            .get(name)
+            .ok_or_else(|| files.unknown(path, "texture", name, self.names.keys().map(String::as_str)))?;
         Ok(match texture_use {
             TextureUse::Color => entry.color,
             TextureUse::Data => entry.data,
@@ -99,11 +111,18 @@ impl TextureTable {
     }
 
     /// The texture that `path` names, for a use where uv is all there is of a surface.
-    pub fn find_by_uv(&self, files: &CompileContext, path: &str, name: &str, texture_use: TextureUse) -> Result<TextureId> {
+    pub fn find_by_uv(
+        &self,
+        files: &CompileContext,
+        path: &str,
+        name: &str,
+        texture_use: TextureUse,
+    ) -> Result<TextureId> {
         let id = self.find(files, path, name, texture_use)?;
         if !self.get(id).attributes().is_empty() {
             let message = format!(
-                "the texture \"{name}\" takes attributes of meshes, which only parameters of materials, opacity and emission of shapes can"
+                "the texture \"{name}\" takes attributes of meshes, which only parameters of materials, opacity and \
+                 emission of shapes can"
             );
             return Err(files.error(path, message));
         }
@@ -190,7 +209,9 @@ impl Loader<'_> {
             return Ok(made.clone());
         }
         let descs = self.descs;
-        let desc = descs.get(name).ok_or_else(|| self.files.unknown(place, "texture", name, descs.keys().map(String::as_str)))?;
+        let desc = descs
+            .get(name)
+            .ok_or_else(|| self.files.unknown(place, "texture", name, descs.keys().map(String::as_str)))?;
         if let Some(first) = self.open.iter().position(|open| open == name) {
             let cycle = format!("{} > {name}", self.open[first..].join(" > "));
             return Err(self.files.error(place, format!("a texture cannot be a part of itself: {cycle}")));
@@ -221,7 +242,9 @@ impl Loader<'_> {
             return Err(self.files.error(&format!("{path}.name"), message));
         }
         if !(scale.is_finite() && scale >= 0.0) {
-            return Err(self.files.error(&format!("{path}.scale"), format!("must be finite and not below 0, not {scale}")));
+            return Err(self
+                .files
+                .error(&format!("{path}.scale"), format!("must be finite and not below 0, not {scale}")));
         }
         Ok(Texture::Attribute(self.attribute(name), scale))
     }
@@ -251,7 +274,9 @@ impl Loader<'_> {
             };
             made.lookups += 1;
             if made.lookups > MAX_LOOKUPS {
-                let message = format!("with the factors of its factors, a product has more than {MAX_LOOKUPS} textures and colours");
+                let message = format!(
+                    "with the factors of its factors, a product has more than {MAX_LOOKUPS} textures and colours"
+                );
                 return Err(files.error(&place, message));
             }
             product.push(texture);
@@ -275,7 +300,17 @@ impl Loader<'_> {
             TextureDesc::VertexColor => Texture::Attribute(self.attribute(VERTEX_COLOR), 1.0),
             TextureDesc::MeshAttribute { name, scale } => self.mesh_attribute(path, name, *scale)?,
             TextureDesc::Product { factors } => return self.product(path, factors, texture_use),
-            TextureDesc::Image { file, color_space, filter, wrap, scale, rotation_degrees, offset, channel, invert } => {
+            TextureDesc::Image {
+                file,
+                color_space,
+                filter,
+                wrap,
+                scale,
+                rotation_degrees,
+                offset,
+                channel,
+                invert,
+            } => {
                 let scale = files.uv(&format!("{path}.scale"), *scale)?;
                 let offset = files.uv(&format!("{path}.offset"), *offset)?;
                 if !rotation_degrees.is_finite() {
@@ -296,22 +331,13 @@ impl Loader<'_> {
                         (ColorSpaceDesc::Linear, _) | (ColorSpaceDesc::Auto, TextureUse::Data) => Decoding::Linear,
                     },
                     image,
-                    filter: match filter {
-                        TextureFilterDesc::Nearest => TextureFilter::Nearest,
-                        TextureFilterDesc::Bilinear => TextureFilter::Bilinear,
-                        TextureFilterDesc::Trilinear => TextureFilter::Trilinear,
-                    },
+                    filter: texture_filter(*filter),
                     wrap: match wrap {
                         WrapDesc::Both(mode) => [wrap_mode(*mode); 2],
                         WrapDesc::Each(modes) => modes.map(wrap_mode),
                     },
                     transform: UvTransform::new(scale, rotation_degrees.to_radians(), offset),
-                    channel: channel.map(|channel| match channel {
-                        ChannelDesc::R => Channel::R,
-                        ChannelDesc::G => Channel::G,
-                        ChannelDesc::B => Channel::B,
-                        ChannelDesc::A => Channel::A,
-                    }),
+                    channel: channel.map(single_channel),
                     invert: *invert,
                 })
             }
@@ -328,6 +354,23 @@ fn wrap_mode(desc: WrapModeDesc) -> Wrap {
     }
 }
 
+fn texture_filter(desc: TextureFilterDesc) -> TextureFilter {
+    match desc {
+        TextureFilterDesc::Nearest => TextureFilter::Nearest,
+        TextureFilterDesc::Bilinear => TextureFilter::Bilinear,
+        TextureFilterDesc::Trilinear => TextureFilter::Trilinear,
+    }
+}
+
+fn single_channel(desc: ChannelDesc) -> Channel {
+    match desc {
+        ChannelDesc::R => Channel::R,
+        ChannelDesc::G => Channel::G,
+        ChannelDesc::B => Channel::B,
+        ChannelDesc::A => Channel::A,
+    }
+}
+
 /// What an unused texture has in place of its image.
 fn blank() -> ImageData {
     ImageData { width: 1, height: 1, channels: 1, samples: Samples::U8(vec![0]) }
@@ -336,11 +379,17 @@ fn blank() -> ImageData {
 /// The images of all used files that can be read, in parallel; the others are reported when they are used.
 fn read_all(files: &CompileContext, desc: &SceneDesc, used: &UsedNames) -> HashMap<PathBuf, Arc<TextureImage>> {
     let file = |texture: &TextureDesc| match texture {
-        TextureDesc::Image { file, .. } if !files.source.assets.images.contains_key(file) => files.source.asset(file).canonicalize().ok(),
+        TextureDesc::Image { file, .. } if !files.source.assets.images.contains_key(file) => {
+            files.source.asset(file).canonicalize().ok()
+        }
         _ => None,
     };
-    let names: BTreeSet<PathBuf> =
-        desc.textures.iter().filter(|(name, _)| used.textures.contains(*name)).filter_map(|(_, texture)| file(texture)).collect();
+    let names: BTreeSet<PathBuf> = desc
+        .textures
+        .iter()
+        .filter(|(name, _)| used.textures.contains(*name))
+        .filter_map(|(_, texture)| file(texture))
+        .collect();
     let read = |asset: PathBuf| {
         let image = TextureImage::new(read_image(&asset).ok()?).ok()?;
         Some((asset, Arc::new(image)))
@@ -360,7 +409,8 @@ fn kept_image(
     if let Some(image) = images.get(&asset) {
         return Ok(Arc::clone(image));
     }
-    let image = TextureImage::new(data.clone()).map_err(|e| files.asset_error(place, &asset, AssetError::Malformed(e.to_string())))?;
+    let image = TextureImage::new(data.clone())
+        .map_err(|e| files.asset_error(place, &asset, AssetError::Malformed(e.to_string())))?;
     Ok(Arc::clone(images.entry(asset).or_insert(Arc::new(image))))
 }
 

@@ -47,7 +47,9 @@ impl CompileContext {
     /// The map of one step.
     pub(super) fn step(&self, path: &str, step: &TransformStepDesc) -> Result<DAffine3> {
         Ok(match step {
-            TransformStepDesc::Translate(offset) => DAffine3::from_translation(self.vector(&format!("{path}.translate"), *offset)?),
+            TransformStepDesc::Translate(offset) => {
+                DAffine3::from_translation(self.vector(&format!("{path}.translate"), *offset)?)
+            }
             TransformStepDesc::Rotate { axis, degrees } => {
                 let axis = self.direction(&format!("{path}.rotate.axis"), *axis)?;
                 if !degrees.is_finite() {

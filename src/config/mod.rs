@@ -87,10 +87,11 @@ pub fn read(file: &Path, trust: Trust, user: u32) -> Result<Result<Vec<Entry>, S
 /// The message about an option that a project's file cannot set, with where it can be set.
 fn not_for_projects(key: &str) -> String {
     let variable = format!("{PREFIX}{}", key.to_uppercase().replace('-', "_"));
-    let file = user_file().map_or_else(|| "~/.config/steradian/config.toml".to_owned(), |file| file.display().to_string());
+    let file =
+        user_file().map_or_else(|| "~/.config/steradian/config.toml".to_owned(), |file| file.display().to_string());
     format!(
-        "\"{key}\" is not for a project's file, which sets what the picture is, not what is loaded, written or connected to; use --{key}, \
-         {variable} or {file}"
+        "\"{key}\" is not for a project's file, which sets what the picture is, not what is loaded, written or \
+         connected to; use --{key}, {variable} or {file}"
     )
 }
 
@@ -102,7 +103,8 @@ pub fn parse(file: &Path, trust: Trust, text: &str) -> Result<Vec<Entry>> {
     let line_of = |offset: usize| text.as_bytes().iter().take(offset).filter(|byte| **byte == b'\n').count() + 1;
     let fault = |line: usize, message: &str| Error::Usage(format!("{}:{line}: {message}", file.display()));
     let table = DeTable::parse(text).map_err(|e| fault(e.span().map_or(1, |span| line_of(span.start)), e.message()))?;
-    let mut pairs: Vec<_> = table.get_ref().iter().map(|(key, value)| (key.span().start, key.get_ref(), value.get_ref())).collect();
+    let mut pairs: Vec<_> =
+        table.get_ref().iter().map(|(key, value)| (key.span().start, key.get_ref(), value.get_ref())).collect();
     pairs.sort_by_key(|(start, ..)| *start);
     let mut entries: Vec<Entry> = Vec::new();
     for (start, key, value) in pairs {
@@ -127,7 +129,9 @@ fn words(value: &DeValue<'_>) -> Result<Words, &'static str> {
     };
     match value {
         DeValue::Boolean(on) => Ok(Words::Switch(*on)),
-        DeValue::Array(items) => items.iter().map(|item| one(item.get_ref())).collect::<Result<_, _>>().map(Words::Many),
+        DeValue::Array(items) => {
+            items.iter().map(|item| one(item.get_ref())).collect::<Result<_, _>>().map(Words::Many)
+        }
         value => one(value).map(Words::One),
     }
 }
@@ -178,7 +182,9 @@ mod tests {
             let warning = read(&file, Trust::User, user).unwrap().unwrap_err();
             assert!(warning.contains("s.toml belongs to another user"), "{warning}");
         }
-        for (bytes, message) in [("#".repeat(2 << 20).into_bytes(), "longer than"), (b"owner = \"\xe9\"".to_vec(), "not UTF-8")] {
+        for (bytes, message) in
+            [("#".repeat(2 << 20).into_bytes(), "longer than"), (b"owner = \"\xe9\"".to_vec(), "not UTF-8")]
+        {
             std::fs::write(&file, bytes).unwrap();
             assert!(read(&file, Trust::Project, owner).unwrap_err().to_string().contains(message));
         }

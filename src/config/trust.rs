@@ -75,7 +75,10 @@ const OPTIONS: [(Trust, &[&str]); 3] = [
             "verbose",
         ],
     ),
-    (Trust::CommandLine, &["pixel", "sample", "frames", "checkpoint", "resume", "shard", "json", "report", "help", "version"]),
+    (
+        Trust::CommandLine,
+        &["pixel", "sample", "frames", "checkpoint", "resume", "shard", "json", "report", "help", "version"],
+    ),
 ];
 
 /// Who may set this option; `None` if there is none of the name.

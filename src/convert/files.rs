@@ -173,8 +173,15 @@ impl<'a> AssetCopier<'a> {
     }
 
     /// Copies a text; `change` gives what stands behind a line's first word in place of what does, if that changes.
-    fn copy_text(&mut self, path: &str, original: &Path, new: &str, mut change: impl FnMut(&str, &str) -> Option<String>) -> Result<()> {
-        let bytes = file::read(original).map_err(|e| Error::Missing { file: original.into(), message: e.to_string() })?;
+    fn copy_text(
+        &mut self,
+        path: &str,
+        original: &Path,
+        new: &str,
+        mut change: impl FnMut(&str, &str) -> Option<String>,
+    ) -> Result<()> {
+        let bytes =
+            file::read(original).map_err(|e| Error::Missing { file: original.into(), message: e.to_string() })?;
         let mut copy = Vec::with_capacity(bytes.len());
         for line in bytes.split_inclusive(|&byte| byte == b'\n') {
             let changed = std::str::from_utf8(line).ok().and_then(|line| {
@@ -221,7 +228,9 @@ const START: u64 = 1 << 16;
 fn check_kind(path: &Path, start: &[u8]) -> Result<()> {
     let kind = path.extension().map(|e| e.to_string_lossy().to_uppercase()).unwrap_or_default();
     let start = start.strip_prefix(MARK).unwrap_or(start);
-    let has_line = |word: &str| start.split(|byte| *byte == b'\n').any(|line| line.trim_ascii_start().starts_with(word.as_bytes()));
+    let has_line = |word: &str| {
+        start.split(|byte| *byte == b'\n').any(|line| line.trim_ascii_start().starts_with(word.as_bytes()))
+    };
     let is_image = || image::guess_format(start).is_ok();
     let is_so = match kind.as_str() {
         "OBJ" => ["v ", "v\t", "mtllib ", "o ", "g "].iter().any(|word| has_line(word)),
@@ -232,7 +241,11 @@ fn check_kind(path: &Path, start: &[u8]) -> Result<()> {
         "SERIALIZED" => start.starts_with(&[0x1c, 0x04]),
         // These have no mark, but a kind of image and a depth from a short list.
         "TGA" => {
-            is_image() || matches!(start, [_, 0 | 1, 1..=3 | 9..=11, _, _, _, _, _, _, _, _, _, _, _, _, _, 8 | 15 | 16 | 24 | 32, ..])
+            is_image()
+                || matches!(
+                    start,
+                    [_, 0 | 1, 1..=3 | 9..=11, _, _, _, _, _, _, _, _, _, _, _, _, _, 8 | 15 | 16 | 24 | 32, ..]
+                )
         }
         _ => is_image(),
     };
@@ -260,7 +273,9 @@ impl Names {
         if let Some(name) = self.0.get(original) {
             return name.clone();
         }
-        let file = Path::new(&original.replace('\\', "/")).file_name().map_or("file".into(), |name| name.to_string_lossy().into_owned());
+        let file = Path::new(&original.replace('\\', "/"))
+            .file_name()
+            .map_or("file".into(), |name| name.to_string_lossy().into_owned());
         let is_taken = |name: &String| self.0.values().any(|other| other == name);
         let (stem, extension) = file.rsplit_once('.').unwrap_or((&file, "bin"));
         let other = |n: usize| if n == 1 { file.clone() } else { format!("{stem}_{n}.{extension}") };
@@ -309,7 +324,12 @@ fn write_environment(image: &RgbImage, out: &mut BufWriter<&mut fs::File>) -> Re
 }
 
 /// Writes planes of floats by the names of their channels.
-fn write_exr(width: usize, height: usize, planes: Vec<(&str, Vec<f32>)>, out: &mut BufWriter<&mut fs::File>) -> Result<(), String> {
+fn write_exr(
+    width: usize,
+    height: usize,
+    planes: Vec<(&str, Vec<f32>)>,
+    out: &mut BufWriter<&mut fs::File>,
+) -> Result<(), String> {
     use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image, WritableImage};
     let channels = planes.into_iter().map(|(name, samples)| AnyChannel::new(name, FlatSamples::F32(samples))).collect();
     let image = Image::from_channels((width, height), AnyChannels::sort(channels));
@@ -324,7 +344,10 @@ mod tests {
     use super::*;
     use crate::assets::{read_image, read_rgb_image};
 
-    fn file(name: &str, write: impl FnOnce(&mut BufWriter<&mut fs::File>) -> Result<(), String>) -> (tempfile::TempDir, PathBuf) {
+    fn file(
+        name: &str,
+        write: impl FnOnce(&mut BufWriter<&mut fs::File>) -> Result<(), String>,
+    ) -> (tempfile::TempDir, PathBuf) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(name);
         write_atomically(&path, write).unwrap();
@@ -343,7 +366,12 @@ mod tests {
                 assert_eq!(read_image(&path).unwrap(), image);
             }
         }
-        let floats = ImageData { width: 2, height: 1, channels: 4, samples: Samples::F32(vec![1e-3, 2.5, 1e9, 0.25, -1.0, 3.0, 4.0, 1.0]) };
+        let floats = ImageData {
+            width: 2,
+            height: 1,
+            channels: 4,
+            samples: Samples::F32(vec![1e-3, 2.5, 1e9, 0.25, -1.0, 3.0, 4.0, 1.0]),
+        };
         let (_folder, path) = file("a.exr", |out| write_image(&floats, out));
         assert_eq!(read_image(&path).unwrap(), floats);
     }

@@ -91,7 +91,8 @@ mod tests {
     #[test]
     fn the_text_means_the_same_and_lists_are_short() {
         let scene = r#"{ "camera": { "position": [0.1, 2, 3], "look_at": [0, 0, 0] }, "comment": "a [1,\n 2] \"b\"",
-            "shapes": [{ "type": "sphere", "name": "[", "transform": [{ "matrix": [[1,0,0,0.1],[0,1,0,0],[0,0,1,0],[0,0,0,1]] }] },
+            "shapes": [{ "type": "sphere", "name": "[",
+                         "transform": [{ "matrix": [[1,0,0,0.1],[0,1,0,0],[0,0,1,0],[0,0,0,1]] }] },
                        { "type": "quad", "material": "m", "emission": { "radiance": [1, 1, 1] } }],
             "materials": { "m": { "type": "diffuse", "albedo": [0.1, 0.2, 0.3] } } }"#;
         let desc = parse_scene(scene, Path::new("s.json")).unwrap();

@@ -33,7 +33,13 @@ pub enum Originals {
 /// # Errors
 /// [`Error::Usage`] if a file would be overwritten that is read, before any is written, [`Error::Missing`] if a file
 /// that the world uses is not there, [`Error::Output`] if one cannot be written.
-pub fn write_scene(imported: &Imported, source: &Path, target: &Path, originals: Originals, mut uses: FileUses) -> Result<usize> {
+pub fn write_scene(
+    imported: &Imported,
+    source: &Path,
+    target: &Path,
+    originals: Originals,
+    mut uses: FileUses,
+) -> Result<usize> {
     if !target.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
         return Err(Error::Usage(format!("{}: Steradian's scene files end with .json", target.display())));
     }

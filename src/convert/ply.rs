@@ -60,7 +60,9 @@ fn declare(name: &str, values: &AttributeValues, out: &mut impl Write) -> Result
 }
 
 fn write_attributes(attributes: &[(&str, &AttributeValues)], i: usize, out: &mut impl Write) -> Result<()> {
-    let numbers = attributes.iter().flat_map(|(_, values)| values.numbers().iter().skip(i * values.channels()).take(values.channels()));
+    let numbers = attributes
+        .iter()
+        .flat_map(|(_, values)| values.numbers().iter().skip(i * values.channels()).take(values.channels()));
     numbers.into_iter().try_for_each(|value| out.write_all(&value.to_le_bytes()))
 }
 
@@ -87,7 +89,8 @@ mod tests {
         ];
         for present in 0..16 {
             let (normals, uvs) = (normals.clone().filter(|_| present & 1 > 0), uvs.clone().filter(|_| present & 2 > 0));
-            let mut mesh = MeshData { normals, uvs, ..plain.clone() }.with_colors(colors.clone().filter(|_| present & 4 > 0));
+            let mut mesh =
+                MeshData { normals, uvs, ..plain.clone() }.with_colors(colors.clone().filter(|_| present & 4 > 0));
             if present & 8 > 0 {
                 mesh.attributes.extend(attributes.clone().map(|(name, values)| (name.to_owned(), values)));
             }

@@ -11,7 +11,8 @@ pub fn replace_non_finite(pixels: &mut [Triple], width: usize) -> u64 {
     let count = left.len() as u64;
     while !left.is_empty() {
         // Every pixel of a round is made from earlier rounds alone, so that the order within a round does not matter.
-        let made: Vec<(usize, Triple)> = left.iter().filter_map(|&i| Some((i, mean_around(pixels, &bad, width, i)?))).collect();
+        let made: Vec<(usize, Triple)> =
+            left.iter().filter_map(|&i| Some((i, mean_around(pixels, &bad, width, i)?))).collect();
         if made.is_empty() {
             left.iter().for_each(|&i| pixels[i] = [0.0; 3]);
             break;

@@ -95,17 +95,22 @@ impl Plan {
         let (albedo, normal) = (feature(&options.albedo, &ALBEDO)?, feature(&options.normal, &NORMAL)?);
         match (albedo, normal) {
             (None, _) if options.without_features => {}
-            (None, None) => notes.push("there are no layers of albedo and normals; with them more detail survives".to_owned()),
+            (None, None) => {
+                notes.push("there are no layers of albedo and normals; with them more detail survives".to_owned());
+            }
             (None, Some(_)) => notes.push("there is no layer of albedo; normals without it are not used".to_owned()),
             _ => {}
         }
         let last = |name: &str| name.rsplit('.').next().unwrap_or(name).to_lowercase();
         let groups: Vec<_> = layers.all_of(color).filter(|(name, _)| last(name).starts_with(LIGHT_GROUP)).collect();
-        let is_kind =
-            |name: &str| LayerInfo::ALL.iter().any(|info| matches!(info.source, LayerSource::LightAov(_)) && info.name == last(name));
+        let is_kind = |name: &str| {
+            LayerInfo::ALL.iter().any(|info| matches!(info.source, LayerSource::LightAov(_)) && info.name == last(name))
+        };
         let kinds: Vec<_> = layers.all_of(color).filter(|(name, _)| is_kind(name)).collect();
         let mut sets = Vec::new();
-        for (set, what) in [(groups, "light groups"), (kinds, "kinds of light")].into_iter().filter(|(set, _)| !set.is_empty()) {
+        for (set, what) in
+            [(groups, "light groups"), (kinds, "kinds of light")].into_iter().filter(|(set, _)| !set.is_empty())
+        {
             if adds_up(file, color, &set) {
                 sets.push(set);
             } else {
@@ -145,7 +150,9 @@ impl Plan {
         let mut report = prepared.finish();
         report.notes.clone_from(&self.notes);
         let attributes = &mut file.layer_data[self.color[0].part].attributes;
-        attributes.other.insert(Text::from(Report::ATTRIBUTE), AttributeValue::Text(Text::from(report.attribute().as_str())));
+        attributes
+            .other
+            .insert(Text::from(Report::ATTRIBUTE), AttributeValue::Text(Text::from(report.attribute().as_str())));
         Ok(report)
     }
 
@@ -176,7 +183,8 @@ fn values(file: &FlatImage, place: Place) -> Vec<f32> {
 }
 
 fn pixels(file: &FlatImage, layer: Rgb) -> Vec<Triple> {
-    let [r, g, b] = layer.map(|place| file.layer_data[place.part].channel_data.list[place.channel].sample_data.values_as_f32());
+    let [r, g, b] =
+        layer.map(|place| file.layer_data[place.part].channel_data.list[place.channel].sample_data.values_as_f32());
     r.zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect()
 }
 
@@ -184,7 +192,9 @@ fn pixels(file: &FlatImage, layer: Rgb) -> Vec<Triple> {
 fn set_values(file: &mut FlatImage, place: Place, values: impl Iterator<Item = f32>) {
     let samples = &mut file.layer_data[place.part].channel_data.list[place.channel].sample_data;
     *samples = match samples {
-        FlatSamples::F16(_) => FlatSamples::F16(values.map(|v| f16::from_f32(v.clamp(f16::MIN.to_f32(), f16::MAX.to_f32()))).collect()),
+        FlatSamples::F16(_) => {
+            FlatSamples::F16(values.map(|v| f16::from_f32(v.clamp(f16::MIN.to_f32(), f16::MAX.to_f32()))).collect())
+        }
         FlatSamples::F32(_) | FlatSamples::U32(_) => FlatSamples::F32(values.collect()),
     };
 }

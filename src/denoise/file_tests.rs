@@ -6,7 +6,10 @@ const SIZE: (usize, usize) = (4, 3);
 
 /// A part with these channels, each of its own constant, or of the numbers given.
 fn part(name: Option<&str>, channels: &[(&str, f32)]) -> Layer<AnyChannels<FlatSamples>> {
-    let list = channels.iter().map(|(name, value)| AnyChannel::new(*name, FlatSamples::F32(vec![*value; SIZE.0 * SIZE.1]))).collect();
+    let list = channels
+        .iter()
+        .map(|(name, value)| AnyChannel::new(*name, FlatSamples::F32(vec![*value; SIZE.0 * SIZE.1])))
+        .collect();
     let mut attributes = LayerAttributes { layer_name: name.map(Text::from), ..LayerAttributes::default() };
     attributes.layer_position = Vec2(-1, 2);
     Layer::new(Vec2(SIZE.0, SIZE.1), attributes, Encoding::FAST_LOSSLESS, AnyChannels::sort(list))
@@ -53,8 +56,14 @@ fn layers_of_other_programs_are_recognised() {
     ]
     .concat());
     assert_eq!(found(&ours, &auto).unwrap(), [triple(1.0), triple(4.0), triple(5.0)]);
-    let pbrt =
-        one(&[layer!("", 1.0), layer!("Albedo.", 2.0), layer!("N.", xyz, 3.0), layer!("Ns.", xyz, 4.0), layer!("P.", xyz, 5.0)].concat());
+    let pbrt = one(&[
+        layer!("", 1.0),
+        layer!("Albedo.", 2.0),
+        layer!("N.", xyz, 3.0),
+        layer!("Ns.", xyz, 4.0),
+        layer!("P.", xyz, 5.0),
+    ]
+    .concat());
     assert_eq!(found(&pbrt, &auto).unwrap(), [triple(1.0), triple(2.0), triple(4.0)]);
     let blender = one(&[
         layer!("ViewLayer.Combined.", 1.0),
@@ -67,15 +76,24 @@ fn layers_of_other_programs_are_recognised() {
     assert_eq!(found(&blender, &auto).unwrap(), [triple(1.0), triple(2.0), triple(3.0)]);
     let mitsuba = one(&[layer!("", 1.0), layer!("albedo.", 2.0), layer!("sh_normal.", xyz, 3.0)].concat());
     assert_eq!(found(&mitsuba, &auto).unwrap(), [triple(1.0), triple(2.0), triple(3.0)]);
-    let parts =
-        several([part(Some("albedo"), &layer!("", 2.0)), part(Some("rgba"), &layer!("", 1.0)), part(Some("N"), &layer!("", xyz, 3.0))]);
+    let parts = several([
+        part(Some("albedo"), &layer!("", 2.0)),
+        part(Some("rgba"), &layer!("", 1.0)),
+        part(Some("N"), &layer!("", xyz, 3.0)),
+    ]);
     assert_eq!(found(&parts, &auto).unwrap(), [triple(1.0), triple(2.0), triple(3.0)]);
 }
 
 #[test]
 fn layers_may_be_named_and_must_be_there() {
-    let file = one(&[layer!("", 1.0), layer!("albedo.", 2.0), layer!("diffcolor.", 3.0), layer!("worldNormal.", xyz, 4.0)].concat());
-    let named = |albedo: &str| FileOptions { albedo: Some(albedo.into()), normal: Some("worldNormal".into()), ..FileOptions::default() };
+    let file =
+        one(&[layer!("", 1.0), layer!("albedo.", 2.0), layer!("diffcolor.", 3.0), layer!("worldNormal.", xyz, 4.0)]
+            .concat());
+    let named = |albedo: &str| FileOptions {
+        albedo: Some(albedo.into()),
+        normal: Some("worldNormal".into()),
+        ..FileOptions::default()
+    };
     assert_eq!(found(&file, &named("diffcolor")).unwrap(), [triple(1.0), triple(3.0), triple(4.0)]);
     let absent = found(&file, &named("diffuse")).unwrap_err();
     assert!(absent.starts_with("there is no layer diffuse with") && absent.contains("diffcolor.R"), "{absent}");
@@ -103,9 +121,17 @@ fn what_cannot_be_denoised_is_said() {
 #[test]
 fn groups_are_those_that_add_up() {
     let plan = |channels: &[[(&str, f32); 3]]| Plan::new(&one(&channels.concat()), &FileOptions::default()).unwrap();
-    let sound = plan(&[layer!("", 3.0), layer!("light_key.", 1.0), [("light_fill.R", 2.0), ("light_fill.G", 2.0), ("light_fill.B", 2.0)]]);
+    let sound = plan(&[
+        layer!("", 3.0),
+        layer!("light_key.", 1.0),
+        [("light_fill.R", 2.0), ("light_fill.G", 2.0), ("light_fill.B", 2.0)],
+    ]);
     let names: Vec<&str> = sound.sets[0].iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!((names, sound.sets.len()), (vec!["light_fill", "light_key"], 1));
     let unsound = plan(&[layer!("", 3.0), layer!("light_key.", 1.0)]);
-    assert!(unsound.sets.is_empty() && unsound.notes.iter().any(|note| note.contains("light groups do not add up")), "{:?}", unsound.notes);
+    assert!(
+        unsound.sets.is_empty() && unsound.notes.iter().any(|note| note.contains("light groups do not add up")),
+        "{:?}",
+        unsound.notes
+    );
 }

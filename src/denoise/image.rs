@@ -21,7 +21,9 @@ pub fn denoise_image(denoiser: &Denoiser, image: &mut Image) -> Result<Report> {
     let size = [image.crop.width as usize, image.crop.height as usize];
     let [albedo, normal] = FEATURE_LAYERS.map(|kind| image.layer(kind).map(triples));
     let mut prepared = Prepared::new(denoiser, size, albedo, normal)?;
-    let Some(color) = image.layers.iter().position(|layer| layer.kind == LayerKind::Color) else { return Ok(prepared.finish()) };
+    let Some(color) = image.layers.iter().position(|layer| layer.kind == LayerKind::Color) else {
+        return Ok(prepared.finish());
+    };
     let noisy = Layer::new(LayerKind::Noisy, image.layers[color].data.clone());
     let total = prepared.picture(LayerInfo::of(LayerKind::Color).name, triples(&noisy))?;
     let alpha: Vec<f32> = noisy.channel(3).collect();

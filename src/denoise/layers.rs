@@ -51,11 +51,15 @@ impl<'f> Layers<'f> {
         let mut found: Vec<&(String, Rgb)> = self
             .triples
             .iter()
-            .filter(|(name, rgb)| is_color(rgb) && !is_other(name) && !(name.is_empty() && is_other(&self.part_name(rgb[0].part))))
+            .filter(|(name, rgb)| {
+                is_color(rgb) && !is_other(name) && !(name.is_empty() && is_other(&self.part_name(rgb[0].part)))
+            })
             .collect();
         // The sort is stable: of equals the first in the file.
         found.sort_by_key(|(name, _)| (!name.is_empty(), !name.contains("ombined"), name.len()));
-        let (name, rgb) = found.first().ok_or_else(|| format!("there are no channels R, G and B; it has {}", self.channel_names()))?;
+        let (name, rgb) = found
+            .first()
+            .ok_or_else(|| format!("there are no channels R, G and B; it has {}", self.channel_names()))?;
         for place in rgb {
             let channel = &self.file.layer_data[place.part].channel_data.list[place.channel];
             if channel.sampling != Vec2(1, 1) {
@@ -69,8 +73,10 @@ impl<'f> Layers<'f> {
     pub fn alpha(&self, prefix: &str, color: Rgb) -> Option<Place> {
         let part = color[0].part;
         let list = &self.file.layer_data[part].channel_data.list;
-        let is_alpha =
-            |name: &str| name.strip_prefix(prefix).is_some_and(|rest| rest.eq_ignore_ascii_case("a") || rest.eq_ignore_ascii_case("alpha"));
+        let is_alpha = |name: &str| {
+            name.strip_prefix(prefix)
+                .is_some_and(|rest| rest.eq_ignore_ascii_case("a") || rest.eq_ignore_ascii_case("alpha"))
+        };
         let channel = list.iter().position(|channel| is_alpha(&channel.name.to_string()))?;
         (list[channel].sampling == Vec2(1, 1)).then_some(Place { part, channel })
     }
@@ -88,14 +94,18 @@ impl<'f> Layers<'f> {
     pub fn named(&self, names: &[&str], color: Rgb) -> Result<Option<Rgb>, String> {
         let full = |name: &str, rgb: &Rgb| if name.is_empty() { self.part_name(rgb[0].part) } else { name.to_owned() };
         let matches = |requested: &str| {
-            self.triples.iter().find(|(name, rgb)| *rgb != color && ends_with_layer(&full(name, rgb).to_lowercase(), requested))
+            self.triples
+                .iter()
+                .find(|(name, rgb)| *rgb != color && ends_with_layer(&full(name, rgb).to_lowercase(), requested))
         };
         let Some((name, rgb)) = names.iter().find_map(|requested| matches(requested)) else { return Ok(None) };
         let [own, picture] = [rgb[0].part, color[0].part].map(|part| &self.file.layer_data[part]);
         if own.size != picture.size || own.attributes.layer_position != picture.attributes.layer_position {
             return Err(format!("layer {} has another data window than the picture", full(name, rgb)));
         }
-        let subsampled = rgb.iter().any(|place| self.file.layer_data[place.part].channel_data.list[place.channel].sampling != Vec2(1, 1));
+        let subsampled = rgb
+            .iter()
+            .any(|place| self.file.layer_data[place.part].channel_data.list[place.channel].sampling != Vec2(1, 1));
         if subsampled { Err(format!("layer {} is subsampled", full(name, rgb))) } else { Ok(Some(*rgb)) }
     }
 
@@ -105,7 +115,8 @@ impl<'f> Layers<'f> {
     }
 
     fn channel_names(&self) -> String {
-        let names: Vec<String> = self.file.layer_data.iter().flat_map(|part| &part.channel_data.list).map(|c| c.name.to_string()).collect();
+        let names: Vec<String> =
+            self.file.layer_data.iter().flat_map(|part| &part.channel_data.list).map(|c| c.name.to_string()).collect();
         names.join(", ")
     }
 

@@ -75,8 +75,10 @@ fn packages_below(prefix: &Path) -> Vec<PathBuf> {
 /// What is in a folder and has a name that begins so, in order.
 fn sorted(folder: &Path, start: &str) -> Vec<PathBuf> {
     let entries = folder.read_dir().into_iter().flatten().flatten();
-    let mut found: Vec<PathBuf> =
-        entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(start)).map(|entry| entry.path()).collect();
+    let mut found: Vec<PathBuf> = entries
+        .filter(|entry| entry.file_name().to_string_lossy().starts_with(start))
+        .map(|entry| entry.path())
+        .collect();
     found.sort();
     found
 }
@@ -106,7 +108,9 @@ pub fn open_first<T>(
     let mut looked = Vec::new();
     match open(Path::new(FILE_NAME)) {
         Ok(library) => return Ok(library),
-        Err(Unusable(why)) if why.contains("No such file") => looked.push("where the system keeps libraries".to_owned()),
+        Err(Unusable(why)) if why.contains("No such file") => {
+            looked.push("where the system keeps libraries".to_owned());
+        }
         Err(Unusable(why)) => looked.push(format!("where the system keeps libraries ({why})")),
     }
     let folders = environment.site_packages();
@@ -124,21 +128,30 @@ pub fn open_first<T>(
         looked.push("in Python's packages, of which there are none".to_owned());
     }
     let message = format!(
-        "Intel Open Image Denoise 2 is not installed; `pip install pyoidn` installs it, and --oidn-library or {VARIABLE} name its file or folder; looked {}",
+        "Intel Open Image Denoise 2 is not installed; `pip install pyoidn` installs it, and --oidn-library or \
+         {VARIABLE} name its file or folder; looked {}",
         looked.join(", ")
     );
     Err(Error::Missing { file: FILE_NAME.into(), message })
 }
 
 fn open_named<T>(path: &Path, by: &str, open: &mut impl FnMut(&Path) -> std::result::Result<T, Unusable>) -> Result<T> {
-    let missing = |file: &Path, message: String| Error::Missing { file: file.to_owned(), message: format!("{message} (named by {by})") };
+    let missing = |file: &Path, message: String| Error::Missing {
+        file: file.to_owned(),
+        message: format!("{message} (named by {by})"),
+    };
     let file = if path.is_dir() {
-        inside(path).ok_or_else(|| missing(path, format!("there is no {FILE_NAME} in the folder; `pip install pyoidn` installs it")))?
+        inside(path).ok_or_else(|| {
+            missing(path, format!("there is no {FILE_NAME} in the folder; `pip install pyoidn` installs it"))
+        })?
     } else if path.is_file() {
         // A bare name would be looked for among the system's libraries.
         path.canonicalize().map_err(|e| missing(path, e.to_string()))?
     } else {
-        return Err(missing(path, "there is no such file or folder; `pip install pyoidn` installs the library".to_owned()));
+        return Err(missing(
+            path,
+            "there is no such file or folder; `pip install pyoidn` installs the library".to_owned(),
+        ));
     };
     open(&file).map_err(|Unusable(why)| missing(&file, format!("it cannot serve as Open Image Denoise: {why}")))
 }
@@ -196,7 +209,12 @@ mod tests {
         assert!(text.contains("pip install pyoidn") && text.contains("usr/lib/python3.11/site-packages"), "{text}");
         assert!(!text.contains('\n'));
 
-        let opened = open_first(None, &environment, |file| if file == of_python { Ok(7) } else { Err(Unusable("no".to_owned())) });
+        let opened =
+            open_first(
+                None,
+                &environment,
+                |file| if file == of_python { Ok(7) } else { Err(Unusable("no".to_owned())) },
+            );
         assert_eq!(opened.unwrap(), 7);
     }
 
@@ -221,12 +239,18 @@ mod tests {
         }
         let empty = root.join("empty");
         fs::create_dir(&empty).unwrap();
-        assert!(message(open_first(Some(&empty), &environment, |_| Ok(()))).contains("there is no libOpenImageDenoise.so.2 in the folder"));
+        assert!(
+            message(open_first(Some(&empty), &environment, |_| Ok(())))
+                .contains("there is no libOpenImageDenoise.so.2 in the folder")
+        );
     }
 
     #[test]
     fn without_python_the_message_names_it() {
         let text = message(open_first(None, &ProcessEnvironment::default(), refuse(&mut Vec::new())));
-        assert!(text.contains("where the system keeps libraries, in Python's packages, of which there are none"), "{text}");
+        assert!(
+            text.contains("where the system keeps libraries, in Python's packages, of which there are none"),
+            "{text}"
+        );
     }
 }

@@ -22,7 +22,12 @@ impl<'d> Prepared<'d> {
     /// Denoises the features of a picture of `size` (width, height) pixels, row by row. Albedo is cut to 0..1, normals
     /// to -1..1. Features that are 0 everywhere hold no information and are left out, as are normals without albedo,
     /// which the library has no use for.
-    pub fn new(denoiser: &'d Denoiser, size: [usize; 2], albedo: Option<Vec<Triple>>, normal: Option<Vec<Triple>>) -> Result<Self> {
+    pub fn new(
+        denoiser: &'d Denoiser,
+        size: [usize; 2],
+        albedo: Option<Vec<Triple>>,
+        normal: Option<Vec<Triple>>,
+    ) -> Result<Self> {
         let report = Report { version: denoiser.version(), ..Report::default() };
         let mut prepared = Self { denoiser, size, albedo: None, normal: None, report, start: Instant::now() };
         let is_not_black = |pixels: &Vec<Triple>| pixels.as_flattened().iter().any(|v| *v != 0.0);
@@ -90,7 +95,13 @@ impl<'d> Prepared<'d> {
 
     fn with_features<'a>(&'a self, color: &'a [Triple]) -> Inputs<'a> {
         let clean_features = self.albedo.is_some();
-        Inputs { color: Some(color), albedo: self.albedo.as_deref(), normal: self.normal.as_deref(), clean_features, ..Inputs::default() }
+        Inputs {
+            color: Some(color),
+            albedo: self.albedo.as_deref(),
+            normal: self.normal.as_deref(),
+            clean_features,
+            ..Inputs::default()
+        }
     }
 
     fn color(&self, color: &[Triple]) -> Result<Vec<Triple>> {

@@ -21,18 +21,30 @@ impl SceneDesc {
         let shapes = self.shapes.iter_mut().enumerate().map(|(i, shape)| (format!("shapes[{i}]"), shape, true));
         let objects = self.objects.iter_mut().flat_map(|(name, object)| {
             let is_used = used.objects.contains(name);
-            object.shapes.iter_mut().enumerate().map(move |(i, shape)| (format!("objects.{name}.shapes[{i}]"), shape, is_used))
+            object
+                .shapes
+                .iter_mut()
+                .enumerate()
+                .map(move |(i, shape)| (format!("objects.{name}.shapes[{i}]"), shape, is_used))
         });
         for (path, shape, is_used) in shapes.chain(objects) {
             if let ShapeDesc::Mesh(mesh) = shape {
                 let file = mesh.file.as_mut().map(|file| (format!("{path}.file"), file));
-                let later = mesh.deform_files.iter_mut().enumerate().map(|(i, file)| (format!("{path}.deform_files[{i}]"), file));
+                let later = mesh
+                    .deform_files
+                    .iter_mut()
+                    .enumerate()
+                    .map(|(i, file)| (format!("{path}.deform_files[{i}]"), file));
                 files.extend(file.into_iter().chain(later).map(|(path, name)| NamedFile { path, name, is_used }));
             }
         }
         for (name, texture) in &mut self.textures {
             if let TextureDesc::Image { file, .. } = texture {
-                files.push(NamedFile { path: format!("textures.{name}.file"), name: file, is_used: used.textures.contains(name) });
+                files.push(NamedFile {
+                    path: format!("textures.{name}.file"),
+                    name: file,
+                    is_used: used.textures.contains(name),
+                });
             }
         }
         for (i, light) in self.lights.iter_mut().enumerate() {

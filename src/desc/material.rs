@@ -7,7 +7,11 @@ use super::PrincipledDesc;
 
 /// A colour: `[r, g, b]`, one number for grey, or `{ "texture": "name" }`.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(untagged, deny_unknown_fields, expecting = "expected a colour: [red, green, blue], one number for grey, or { \"texture\": name }")]
+#[serde(
+    untagged,
+    deny_unknown_fields,
+    expecting = "expected a colour: [red, green, blue], one number for grey, or { \"texture\": name }"
+)]
 pub enum ColorDesc {
     /// The same value in every channel.
     Grey(f32),
@@ -36,7 +40,11 @@ pub enum ScalarDesc {
 /// A number, or `{ "texture": "name", "range": [low, high] }`: the number is `low` where the luminance of the texture's
 /// colour, clamped to `[0, 1]`, is 0, and `high` where it is 1.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(untagged, deny_unknown_fields, expecting = "expected a number, or { \"texture\": name, \"range\": [low, high] }")]
+#[serde(
+    untagged,
+    deny_unknown_fields,
+    expecting = "expected a number, or { \"texture\": name, \"range\": [low, high] }"
+)]
 pub enum RangedDesc {
     /// The same everywhere.
     Constant(f32),
@@ -56,7 +64,8 @@ pub enum RangedDesc {
 #[serde(
     untagged,
     deny_unknown_fields,
-    expecting = "expected a number, [along u, along v], { \"texture\": name }, or { \"u\": ..., \"v\": ... } of numbers and textures"
+    expecting = "expected a number, [along u, along v], { \"texture\": name }, or { \"u\": ..., \"v\": ... } of \
+                 numbers and textures"
 )]
 pub enum RoughnessDesc {
     /// The same in all directions.

@@ -18,21 +18,25 @@ mod used;
 
 pub use camera::{BladesDesc, CameraDesc, CameraKindDesc, LensDesc};
 pub use files::NamedFile;
-pub use light::{DirectionalLightDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, PointLightDesc, ProjectorLightDesc, SpotLightDesc};
+pub use light::{
+    DirectionalLightDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, PointLightDesc, ProjectorLightDesc,
+    SpotLightDesc,
+};
 pub use material::{
-    AbsorptionDesc, BumpMapDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, PhongLobeDesc, PlasticDesc,
-    RangedDesc, RoughnessDesc, ScalarDesc,
+    AbsorptionDesc, BumpMapDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc,
+    PhongLobeDesc, PlasticDesc, RangedDesc, RoughnessDesc, ScalarDesc,
 };
 pub use output::{CompressionDesc, CryptoManifestDesc, ExrProfileDesc, LayerKind, OutputDesc, PixelTypeDesc, ViewDesc};
 pub(crate) use principled::principled_parameters;
 pub use principled::{PrincipledDesc, PrincipledModelDesc};
 pub use settings::{
-    FilmDesc, FilterDesc, FilterSamplesDesc, IntegratorDesc, MAX_FILTER_RADIUS, MAX_SIDE, SamplerDesc, SamplerKindDesc, StrategyDesc,
+    FilmDesc, FilterDesc, FilterSamplesDesc, IntegratorDesc, MAX_FILTER_RADIUS, MAX_SIDE, SamplerDesc, SamplerKindDesc,
+    StrategyDesc,
 };
 pub use shape::{
-    AttributeDesc, ConeDesc, CubeDesc, CylinderDesc, DiskDesc, EmissionDesc, InstanceDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc,
-    ObjectDesc, OpacityDesc, PlaneDesc, ProfileDesc, ProfileParameterDesc, QuadDesc, RevolutionDesc, ShapeCommon, ShapeCommonMut,
-    ShapeDesc, SmoothByDesc, SphereDesc,
+    AttributeDesc, ConeDesc, CubeDesc, CylinderDesc, DiskDesc, EmissionDesc, InstanceDesc, MeshDesc, MeshShadingDesc,
+    NormalWeightDesc, ObjectDesc, OpacityDesc, PlaneDesc, ProfileDesc, ProfileParameterDesc, QuadDesc, RevolutionDesc,
+    ShapeCommon, ShapeCommonMut, ShapeDesc, SmoothByDesc, SphereDesc,
 };
 pub use texture::{ChannelDesc, ColorSpaceDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
 pub use transform::{KeyframeDesc, ScaleDesc, TransformDesc, TransformStepDesc};
@@ -94,15 +98,18 @@ impl SceneDesc {
     /// The shapes of the world and of all objects that are used, each with its place.
     pub fn used_shapes<'a>(&'a self, used: &'a UsedNames) -> impl Iterator<Item = (String, &'a ShapeDesc)> {
         let world = self.shapes.iter().enumerate().map(|(i, shape)| (format!("shapes[{i}]"), shape));
-        let objects = self.objects.iter().filter(|(name, _)| used.objects.contains(*name)).flat_map(|(name, object)| {
-            object.shapes.iter().enumerate().map(move |(i, shape)| (format!("objects.{name}.shapes[{i}]"), shape))
-        });
+        let objects =
+            self.objects.iter().filter(|(name, _)| used.objects.contains(*name)).flat_map(|(name, object)| {
+                object.shapes.iter().enumerate().map(move |(i, shape)| (format!("objects.{name}.shapes[{i}]"), shape))
+            });
         world.chain(objects)
     }
 }
 
 /// A map whose names differ; JSON itself would let the last of two win.
-fn unique_names<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<BTreeMap<String, T>, D::Error> {
+fn unique_names<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
+    deserializer: D,
+) -> Result<BTreeMap<String, T>, D::Error> {
     struct Names<T>(PhantomData<T>);
 
     impl<'de, T: Deserialize<'de>> Visitor<'de> for Names<T> {

@@ -21,8 +21,8 @@ macro_rules! principled_parameters {
             /// Reflectance of the dielectric layer ahead, in units of 0.08. Default: 0.5, unless `ior` is given.
             #[serde(skip_serializing_if = "Option::is_none")]
             specular: specular = None,
-            #[doc = " Index of refraction, from 1 to 10, in place of `specular`. Glass that is not `thin` takes at least 1.05, and no \
-texture for either."]
+            #[doc = " Index of refraction, from 1 to 10, in place of `specular`. Glass that is not `thin` takes at \
+least 1.05, and no texture for either."]
             #[serde(skip_serializing_if = "Option::is_none")]
             ior: ior = 1.5,
             /// How much of the base's colour the dielectric layer reflects ahead. Default: 0.

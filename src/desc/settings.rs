@@ -285,7 +285,15 @@ impl IntegratorDesc {
     /// Path tracing by its depths, all else by default.
     pub fn path(max_depth: u32, rr_depth: u32) -> Self {
         let strategy = StrategyDesc::default();
-        Self::Path { max_depth, rr_depth, strategy, clamp: None, regularize: None, hide_emitters: false, guiding: false }
+        Self::Path {
+            max_depth,
+            rr_depth,
+            strategy,
+            clamp: None,
+            regularize: None,
+            hide_emitters: false,
+            guiding: false,
+        }
     }
 }
 

@@ -414,7 +414,11 @@ fn quad_edge_v() -> [f64; 3] {
 
 /// How much of a surface is there, from 0 to 1.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(untagged, deny_unknown_fields, expecting = "expected an opacity: a number, or { \"texture\": name, \"threshold\": number }")]
+#[serde(
+    untagged,
+    deny_unknown_fields,
+    expecting = "expected an opacity: a number, or { \"texture\": name, \"threshold\": number }"
+)]
 pub enum OpacityDesc {
     /// The same everywhere.
     Number(f32),

@@ -32,7 +32,8 @@ impl SceneDesc {
             }
         }
         let objects = self.objects.iter().filter(|(name, _)| used.objects.contains(*name));
-        let shapes: Vec<&ShapeDesc> = self.shapes.iter().chain(objects.flat_map(|(_, object)| &object.shapes)).collect();
+        let shapes: Vec<&ShapeDesc> =
+            self.shapes.iter().chain(objects.flat_map(|(_, object)| &object.shapes)).collect();
         for shape in shapes {
             let common = shape.common();
             common.material.into_iter().for_each(|name| self.use_name(name, &mut used));
@@ -50,7 +51,11 @@ impl SceneDesc {
             TextureDesc::MeshAttribute { name, .. } => Some(name.clone()),
             _ => None,
         };
-        self.textures.iter().filter(|(name, _)| used.textures.contains(*name)).filter_map(|(_, texture)| name(texture)).collect()
+        self.textures
+            .iter()
+            .filter(|(name, _)| used.textures.contains(*name))
+            .filter_map(|(_, texture)| name(texture))
+            .collect()
     }
 
     /// Adds what a word names, and what that refers to.
@@ -75,7 +80,9 @@ impl SceneDesc {
                 Value::String(word) => self.use_name(&word, used),
                 Value::Array(values) => open.extend(values),
                 // A type is no name.
-                Value::Object(keys) => open.extend(keys.into_iter().filter(|(key, _)| key != "type").map(|(_, value)| value)),
+                Value::Object(keys) => {
+                    open.extend(keys.into_iter().filter(|(key, _)| key != "type").map(|(_, value)| value));
+                }
                 _ => {}
             }
         }
@@ -91,8 +98,10 @@ mod tests {
         let desc: SceneDesc = serde_json::from_str(
             r#"{ "camera": {},
             "textures": {
-                "a": { "type": "constant", "color": [0, 0, 0] }, "b": { "type": "product", "factors": [{ "texture": "c" }] },
-                "c": { "type": "checker" }, "d": { "type": "checker" }, "e": { "type": "checker" }, "f": { "type": "checker" },
+                "a": { "type": "constant", "color": [0, 0, 0] },
+                "b": { "type": "product", "factors": [{ "texture": "c" }] },
+                "c": { "type": "checker" }, "d": { "type": "checker" }, "e": { "type": "checker" },
+                "f": { "type": "checker" },
                 "g": { "type": "checker" },
                 "diffuse": { "type": "checker" }
             },
@@ -101,7 +110,8 @@ mod tests {
                 "x": { "type": "diffuse", "albedo": { "texture": "b" } }, "y": { "type": "plastic" },
                 "z": { "type": "diffuse", "albedo": { "texture": "d" } }
             },
-            "lights": [{ "type": "spot", "position": [0, 0, 0], "look_at": [0, 0, 1], "intensity": [1, 1, 1], "texture": "g" }],
+            "lights": [{ "type": "spot", "position": [0, 0, 0], "look_at": [0, 0, 1], "intensity": [1, 1, 1],
+            "texture": "g" }],
             "shapes": [{ "type": "quad", "emission": { "radiance": [1, 1, 1], "texture": "e" } }],
             "objects": {
                 "outer": { "instances": [{ "object": "inner" }] },

@@ -207,9 +207,14 @@ mod tests {
 
     #[test]
     fn ranges_are_short_and_mean_the_same() {
-        for (text, short) in
-            [("1-10", "1-10"), ("1-9x2", "1-9:2"), ("3,1,2,7,20", "1-3,7,20"), ("5,6", "5-6"), ("4", "4"), ("-3-0", "-3-0")]
-        {
+        for (text, short) in [
+            ("1-10", "1-10"),
+            ("1-9x2", "1-9:2"),
+            ("3,1,2,7,20", "1-3,7,20"),
+            ("5,6", "5-6"),
+            ("4", "4"),
+            ("-3-0", "-3-0"),
+        ] {
             assert_eq!(text.parse::<FrameList>().unwrap().ranges(':'), short);
             let mut sorted = frames(text);
             sorted.sort_unstable();
@@ -241,7 +246,10 @@ mod tests {
     #[test]
     fn places_for_numbers_need_frames() {
         for name in ["a.####.exr", "a##.exr", "a.%04d.exr", "####/a.exr"] {
-            assert!(matches!(check_single_name(name), Err(Error::Usage(message)) if message.contains("--frames")), "{name}");
+            assert!(
+                matches!(check_single_name(name), Err(Error::Usage(message)) if message.contains("--frames")),
+                "{name}"
+            );
         }
         for name in ["a.exr", "a#1.exr", "shot#3/a.exr", "100%.exr"] {
             check_single_name(name).unwrap();

@@ -43,7 +43,11 @@ impl Job {
 /// A word as POSIX shells read it back, whatever it contains.
 pub fn quote(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "_-./=:,@%+".contains(c);
-    if !word.is_empty() && word.chars().all(plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', r"'\''")) }
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
 }
 
 /// A path as POSIX shells read it back.
@@ -57,6 +61,9 @@ mod tests {
 
     #[test]
     fn words_survive_the_shell() {
-        assert_eq!([quote("a/b.c"), quote(""), quote("a b"), quote("it's $x")], ["a/b.c", "''", "'a b'", r"'it'\''s $x'"]);
+        assert_eq!(
+            [quote("a/b.c"), quote(""), quote("a b"), quote("it's $x")],
+            ["a/b.c", "''", "'a b'", r"'it'\''s $x'"]
+        );
     }
 }

@@ -13,12 +13,19 @@ use super::job::{Job, quote};
 /// A task that is cancelled gets two minutes to write its checkpoint.
 pub fn openjd_template(job: &Job) -> Value {
     // Paths are strings: the specification requires defaults of type PATH to be relative to the template.
-    let text = |name: &str, value: &str, what: &str| json!({ "name": name, "type": "STRING", "default": value, "description": what });
+    let text = |name: &str, value: &str, what: &str| {
+        json!({
+            "name": name, "type": "STRING", "default": value, "description": what
+        })
+    };
     let mut parameters = vec![
         text("Scene", &job.scene.to_string_lossy(), "The scene"),
         text("Work", &job.folder.to_string_lossy(), "The folder of shards and checkpoints"),
         text("Program", &job.program.to_string_lossy(), "The program steradian"),
-        json!({ "name": "Shards", "type": "INT", "default": job.shards, "minValue": 1, "description": "Into how many shards a picture is split" }),
+        json!({
+            "name": "Shards", "type": "INT", "default": job.shards, "minValue": 1,
+            "description": "Into how many shards a picture is split"
+        }),
     ];
     let outputs: Vec<String> = (1..=job.outputs.len()).map(|i| format!("Output{i}")).collect();
     let output = |(i, output): (usize, &PathBuf)| text(&outputs[i], &output.to_string_lossy(), "A picture to write");
@@ -43,7 +50,10 @@ pub fn openjd_template(job: &Job) -> Value {
         "name": job.name,
         "parameterDefinitions": parameters,
         "steps": [
-            { "name": "Render", "parameterSpace": { "taskParameterDefinitions": space }, "script": script(&render_script(job), &[]) },
+            {
+                "name": "Render", "parameterSpace": { "taskParameterDefinitions": space },
+                "script": script(&render_script(job), &[])
+            },
             merge,
         ],
     })
@@ -53,8 +63,9 @@ pub fn openjd_template(job: &Job) -> Value {
 /// is a command: program, scene, folder of the work, and `further`.
 fn script(text: &str, further: &[String]) -> Value {
     let strings = ["Program", "Scene", "Work"].into_iter().chain(further.iter().map(String::as_str));
-    let args: Vec<String> =
-        std::iter::once("{{Task.File.Run}}".to_owned()).chain(strings.map(|name| format!("{{{{Param.{name}}}}}"))).collect();
+    let args: Vec<String> = std::iter::once("{{Task.File.Run}}".to_owned())
+        .chain(strings.map(|name| format!("{{{{Param.{name}}}}}")))
+        .collect();
     json!({
         "embeddedFiles": [{ "name": "Run", "type": "TEXT", "filename": "run.sh", "data": text }],
         "actions": {
@@ -109,7 +120,8 @@ fn merge_script(job: &Job) -> String {
         ""
     };
     format!(
-        "{HEAD}parts=()\nfor ((i = 1; i <= {{{{Param.Shards}}}}; i++)); do parts+=({name}$i-of-{{{{Param.Shards}}}}.shard); done\n\
+        "{HEAD}parts=()\nfor ((i = 1; i <= {{{{Param.Shards}}}}; i++)); do \
+         parts+=({name}$i-of-{{{{Param.Shards}}}}.shard); done\n\
          outputs=()\nfor output in \"$@\"; do\n{fill}    outputs+=(-o \"$output\")\ndone\n\
          \"$program\" merge \"${{parts[@]}}\" \"${{outputs[@]}}\"\nrm -f \"${{parts[@]}}\" {name}*.checkpoint\n"
     )

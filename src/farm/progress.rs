@@ -66,7 +66,8 @@ impl ProgressFormat {
 }
 
 /// What farms look for in a program's output, anywhere in a line.
-const MARKERS: [&str; 8] = ["openjd_", "Progress:", "PROGRESS:", "ALF_PROGRESS", "FRAME:", "ACTIVITY:", "[ PARSER", "Error:"];
+const MARKERS: [&str; 8] =
+    ["openjd_", "Progress:", "PROGRESS:", "ALF_PROGRESS", "FRAME:", "ACTIVITY:", "[ PARSER", "Error:"];
 
 /// A message on one line in which no farm finds one of its own words, whatever names are in it: the word's first letter
 /// is written as JSON writes odd characters.
@@ -104,7 +105,8 @@ fn plain(event: &Event) -> Vec<String> {
     let frame = status.frame.map(|frame| format!("frame {frame}"));
     let text = Some(&status.text).filter(|text| !text.is_empty()).cloned();
     let notes: Vec<String> = frame.into_iter().chain(text).collect();
-    let notes = if notes.is_empty() || status.fraction >= 1.0 { String::new() } else { format!(" ({})", notes.join(", ")) };
+    let notes =
+        if notes.is_empty() || status.fraction >= 1.0 { String::new() } else { format!(" ({})", notes.join(", ")) };
     vec![format!("Progress: {}%{notes}", percent(status.fraction))]
 }
 
@@ -191,7 +193,10 @@ mod tests {
             ("plain", "Progress: 42% (frame 7, 1.25 Msamples/s, 12 s left)"),
             (
                 "json",
-                r#"{"event":"progress","frame":7,"frame_percent":85.1,"percent":42.5,"samples_per_second":1250000.0,"seconds_left":12.0}"#,
+                concat!(
+                    r#"{"event":"progress","frame":7,"frame_percent":85.1,"percent":42.5,"#,
+                    r#""samples_per_second":1250000.0,"seconds_left":12.0}"#
+                ),
             ),
             ("openjd", "openjd_progress: 42.5"),
             ("alf", "ALF_PROGRESS 42%"),
@@ -248,7 +253,10 @@ mod tests {
 
     #[test]
     fn beginnings_and_ends_have_their_lines() {
-        assert_eq!(lines("afanasy", &Event::Begin(Some(7))), ["FRAME: 7", "PROGRESS: 0%", "ACTIVITY: rendering frame 7"]);
+        assert_eq!(
+            lines("afanasy", &Event::Begin(Some(7))),
+            ["FRAME: 7", "PROGRESS: 0%", "ACTIVITY: rendering frame 7"]
+        );
         assert_eq!(lines("afanasy", &Event::Begin(None)), ["ACTIVITY: rendering"]);
         assert_eq!(lines("afanasy", &Event::Warning("w")), ["[ PARSER WARNING ] w"]);
         assert_eq!(lines("afanasy", &Event::Failure("f")), ["[ PARSER ERROR ] f"]);

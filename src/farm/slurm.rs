@@ -65,7 +65,9 @@ fn check_directives(job: &Job, options: &SlurmOptions) -> Result<()> {
     let further = options.further.iter().map(|text| ("--sbatch", Some(text.as_str())));
     let odd = |text: &&str| printable::line(text) != **text;
     match named.into_iter().chain(optional).chain(further).find_map(|(what, text)| Some((what, text.filter(odd)?))) {
-        Some((what, text)) => Err(Error::Usage(format!("{what}: {text:?} has characters that cannot stand in a job script"))),
+        Some((what, text)) => {
+            Err(Error::Usage(format!("{what}: {text:?} has characters that cannot stand in a job script")))
+        }
         None => Ok(()),
     }
 }
@@ -177,7 +179,10 @@ mod tests {
         }
         assert!(render.contains("--every 30 --resume"));
         assert!(merge.contains("#SBATCH --mem=16G") && !merge.contains("--cpus-per-task"));
-        assert!(submit.contains("submit 1 /show/room.0001.exr '/show/it'\\''s.01.png'\nsubmit 3 /show/room.0003.exr"), "{submit}");
+        assert!(
+            submit.contains("submit 1 /show/room.0001.exr '/show/it'\\''s.01.png'\nsubmit 3 /show/room.0003.exr"),
+            "{submit}"
+        );
         // Every place is filled, and what precedes the directives is comments: Slurm stops reading them at the first
         // command.
         for script in [&render, &merge, &submit] {
@@ -186,7 +191,8 @@ mod tests {
         }
         for script in [&render, &merge] {
             let first_command = script.lines().position(|line| !line.is_empty() && !line.starts_with('#')).unwrap();
-            let last_directive = script.lines().collect::<Vec<_>>().iter().rposition(|line| line.starts_with("#SBATCH")).unwrap();
+            let last_directive =
+                script.lines().collect::<Vec<_>>().iter().rposition(|line| line.starts_with("#SBATCH")).unwrap();
             assert!(last_directive < first_command);
         }
     }
@@ -205,7 +211,9 @@ mod tests {
         assert!(refused(&job(), &SlurmOptions { partition: some(), ..none.clone() }).contains("--partition"));
         assert!(refused(&job(), &SlurmOptions { time: some(), ..none.clone() }).contains("--time"));
         assert!(refused(&job(), &SlurmOptions { memory: some(), ..none.clone() }).contains("--mem"));
-        assert!(refused(&job(), &SlurmOptions { further: vec![strange.to_owned()], ..none.clone() }).contains("--sbatch"));
+        assert!(
+            refused(&job(), &SlurmOptions { further: vec![strange.to_owned()], ..none.clone() }).contains("--sbatch")
+        );
         let percent = Job { folder: "/a%j".into(), ..job() };
         assert!(slurm_scripts(&percent, &none).unwrap()[0].1.contains("#SBATCH --output=/a%%j/log/%x-%A_%a.log\n"));
     }

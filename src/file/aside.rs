@@ -41,7 +41,12 @@ impl Aside {
 
     fn unnamed(target: &Path) -> io::Result<Self> {
         let mut options = File::options();
-        let file = options.read(true).write(true).mode(0o666).custom_flags(OFlags::TMPFILE.bits() as i32).open(folder_of(target))?;
+        let file = options
+            .read(true)
+            .write(true)
+            .mode(0o666)
+            .custom_flags(OFlags::TMPFILE.bits() as i32)
+            .open(folder_of(target))?;
         // It gets its name through /proc, which may be missing.
         fs::metadata(path_of(&file))?;
         // Held until it is in its place, so that nobody takes its short-lived name for left over.
@@ -122,7 +127,8 @@ fn with_free_name<T>(target: &Path, mut make: impl FnMut(&Path) -> io::Result<T>
             made => return made.map(|made| (made, name)),
         }
     }
-    let message = format!("there are {MOST_NAMES} files .steradian-... on their way to it; remove those that are left over");
+    let message =
+        format!("there are {MOST_NAMES} files .steradian-... on their way to it; remove those that are left over");
     Err(io::Error::new(io::ErrorKind::AlreadyExists, message))
 }
 

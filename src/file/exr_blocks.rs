@@ -46,9 +46,24 @@ impl ChannelRow<'_> {
     /// Writes the samples to the items of `to`, one after the other.
     pub fn write<'t, T: 't>(&self, to: impl Iterator<Item = &'t mut T>, convert: impl Fn(f32) -> T) {
         match self.sample_type {
-            SampleType::F16 => self.bytes.as_chunks().0.iter().zip(to).for_each(|(b, to)| *to = convert(f16::from_ne_bytes(*b).to_f32())),
-            SampleType::F32 => self.bytes.as_chunks().0.iter().zip(to).for_each(|(b, to)| *to = convert(f32::from_ne_bytes(*b))),
-            SampleType::U32 => self.bytes.as_chunks().0.iter().zip(to).for_each(|(b, to)| *to = convert(u32::from_ne_bytes(*b) as f32)),
+            SampleType::F16 => self
+                .bytes
+                .as_chunks()
+                .0
+                .iter()
+                .zip(to)
+                .for_each(|(b, to)| *to = convert(f16::from_ne_bytes(*b).to_f32())),
+            SampleType::F32 => {
+                self.bytes.as_chunks().0.iter().zip(to).for_each(|(b, to)| *to = convert(f32::from_ne_bytes(*b)));
+            }
+            SampleType::U32 => {
+                self.bytes
+                    .as_chunks()
+                    .0
+                    .iter()
+                    .zip(to)
+                    .for_each(|(b, to)| *to = convert(u32::from_ne_bytes(*b) as f32));
+            }
         }
     }
 }
@@ -108,16 +123,21 @@ pub fn read_rows(
     mut keep: impl FnMut(ChannelRow),
 ) -> ExrResult<()> {
     let reader = exr::block::read(source, false)?;
-    let shape = |headers: &[Header]| headers.iter().map(|header| (header.layer_size, header.channels.list.len())).collect::<Vec<_>>();
+    let shape = |headers: &[Header]| {
+        headers.iter().map(|header| (header.layer_size, header.channels.list.len())).collect::<Vec<_>>()
+    };
     if shape(reader.headers()) != shape(headers) {
         return Err(ExrError::Invalid("the file changed while it was read".into()));
     }
     // Which of `requested` a channel is, by part and channel; none for parts that are passed over.
-    let mut uses: Vec<Vec<Vec<usize>>> = headers.iter().map(|header| vec![Vec::new(); header.channels.list.len()]).collect();
+    let mut uses: Vec<Vec<Vec<usize>>> =
+        headers.iter().map(|header| vec![Vec::new(); header.channels.list.len()]).collect();
     for (i, place) in requested.iter().enumerate() {
         uses[place.part][place.channel].push(i);
     }
-    let is_read = |part: usize, level: Vec2<usize>| level == Vec2(0, 0) && (every_part || requested.iter().any(|place| place.part == part));
+    let is_read = |part: usize, level: Vec2<usize>| {
+        level == Vec2(0, 0) && (every_part || requested.iter().any(|place| place.part == part))
+    };
     let chunks = reader.filter_chunks(false, |_, _, block| is_read(block.layer, block.level))?;
 
     let mut seen = HashSet::new();
@@ -131,7 +151,12 @@ pub fn read_rows(
             let at = line.location;
             for &requested in &uses[part][at.channel] {
                 let start = at.position.y() * header.layer_size.width() + at.position.x();
-                keep(ChannelRow { requested, start, sample_type: header.channels.list[at.channel].sample_type, bytes: line.value });
+                keep(ChannelRow {
+                    requested,
+                    start,
+                    sample_type: header.channels.list[at.channel].sample_type,
+                    bytes: line.value,
+                });
             }
         }
         Ok(())
@@ -154,7 +179,9 @@ mod tests {
     use super::*;
     use crate::file::exr_headers::read_headers;
     use exr::compression::Compression;
-    use exr::prelude::{AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Image, ImageAttributes, Layer, LineOrder, WritableImage};
+    use exr::prelude::{
+        AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Image, ImageAttributes, Layer, LineOrder, WritableImage,
+    };
     use std::io::Cursor;
 
     const SIZE: Vec2<usize> = Vec2(37, 50);
@@ -207,7 +234,8 @@ mod tests {
             // Four of 320 channels.
             assert_eq!(count, requested.len() * SIZE.area());
             for (place, kept) in requested.iter().zip(kept) {
-                let expected: Vec<f32> = (0..SIZE.area()).map(|pixel| sample(place.part, place.channel, pixel)).collect();
+                let expected: Vec<f32> =
+                    (0..SIZE.area()).map(|pixel| sample(place.part, place.channel, pixel)).collect();
                 assert!(kept == expected, "{compression:?} {place:?}");
             }
         }
@@ -222,7 +250,8 @@ mod tests {
         let whole = std::fs::read(&path).unwrap();
         let read = |bytes: &[u8], part: usize, every_part: bool| {
             let mut count = 0;
-            read_rows(Cursor::new(bytes), &headers, &[Place { part, channel: 0 }], every_part, |_| count += 1).map(|()| count)
+            read_rows(Cursor::new(bytes), &headers, &[Place { part, channel: 0 }], every_part, |_| count += 1)
+                .map(|()| count)
         };
         // The second part comes last.
         let cut = &whole[..whole.len() - 1];
@@ -250,13 +279,25 @@ mod tests {
         check_memory(&path, &headers, 60).unwrap();
         headers[1].layer_size = Vec2(1 << 15, 1 << 15);
         assert_eq!(pixel_count(&headers[1]), Ok(1 << 30));
-        for error in [check_memory(&path, &headers, 1 << 24).unwrap_err(), allocate(&path, &headers[1], 1 << 24, 0.0f32).unwrap_err()] {
+        for error in [
+            check_memory(&path, &headers, 1 << 24).unwrap_err(),
+            allocate(&path, &headers[1], 1 << 24, 0.0f32).unwrap_err(),
+        ] {
             let text = error.to_string();
-            assert!(matches!(error, Error::OutOfMemory(_)) && text.contains("a.exr need ") && text.ends_with(" MiB"), "{text}");
+            assert!(
+                matches!(error, Error::OutOfMemory(_)) && text.contains("a.exr need ") && text.ends_with(" MiB"),
+                "{text}"
+            );
         }
         headers[1].layer_size = Vec2(1 << 15, (1 << 15) + 1);
-        for error in [check_memory(&path, &headers, 0).unwrap_err(), allocate(&path, &headers[1], 1, 0.0f32).unwrap_err()] {
-            assert!(matches!(&error, Error::Malformed { message, .. } if message.contains("32768 x 32769 pixels are too many")), "{error}");
+        for error in
+            [check_memory(&path, &headers, 0).unwrap_err(), allocate(&path, &headers[1], 1, 0.0f32).unwrap_err()]
+        {
+            assert!(
+                matches!(&error, Error::Malformed { message, .. } if message.contains("32768 x 32769 pixels are too \
+                                                                                       many")),
+                "{error}"
+            );
         }
     }
 }

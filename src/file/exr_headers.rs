@@ -65,7 +65,10 @@ mod tests {
     fn write(path: &Path, size: (usize, usize), compression: Compression) {
         let channels = SpecificChannels::rgb(|_| (0.0f32, 0.0f32, 0.0f32));
         let encoding = Encoding { compression, ..Encoding::FAST_LOSSLESS };
-        Image::from_layer(Layer::new(size, LayerAttributes::default(), encoding, channels)).write().to_file(path).unwrap();
+        Image::from_layer(Layer::new(size, LayerAttributes::default(), encoding, channels))
+            .write()
+            .to_file(path)
+            .unwrap();
     }
 
     #[test]

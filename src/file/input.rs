@@ -27,7 +27,11 @@ pub fn open(path: &Path) -> io::Result<Take<File>> {
 }
 
 fn check_regular(metadata: &Metadata) -> io::Result<()> {
-    if metadata.is_file() { Ok(()) } else { Err(io::Error::new(io::ErrorKind::InvalidInput, kind(metadata.file_type()))) }
+    if metadata.is_file() {
+        Ok(())
+    } else {
+        Err(io::Error::new(io::ErrorKind::InvalidInput, kind(metadata.file_type())))
+    }
 }
 
 /// All bytes of a regular file.
@@ -50,7 +54,8 @@ fn read_all(file: &mut Take<File>) -> io::Result<Vec<u8>> {
 /// # Errors
 /// As [`open`], or [`io::ErrorKind::InvalidData`] if it is not UTF-8.
 pub fn read_to_string(path: &Path) -> io::Result<String> {
-    String::from_utf8(without_mark(read(path)?)).map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "the file is not UTF-8"))
+    String::from_utf8(without_mark(read(path)?))
+        .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "the file is not UTF-8"))
 }
 
 /// The byte order mark, which some editors put before UTF-8.
@@ -112,7 +117,10 @@ mod tests {
                 assert_eq!(read, text);
             }
         }
-        assert_eq!((read(&at("a")).unwrap(), read_to_string(&at("link")).unwrap()), (b"text".to_vec(), "text".to_owned()));
+        assert_eq!(
+            (read(&at("a")).unwrap(), read_to_string(&at("link")).unwrap()),
+            (b"text".to_vec(), "text".to_owned())
+        );
         rustix::fs::mkfifoat(rustix::fs::CWD, at("pipe"), rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR).unwrap();
         let _socket = UnixListener::bind(at("socket")).unwrap();
         for (path, what) in [

@@ -54,7 +54,8 @@ impl Lock {
                 // A file system without locks: better no lock than no render. NOLCK is what network file systems
                 // without a lock service report.
                 Err(TryLockError::Error(e))
-                    if e.kind() == io::ErrorKind::Unsupported || e.raw_os_error() == Some(Errno::NOLCK.raw_os_error()) => {}
+                    if e.kind() == io::ErrorKind::Unsupported
+                        || e.raw_os_error() == Some(Errno::NOLCK.raw_os_error()) => {}
                 Err(TryLockError::Error(e)) => return Err(LockError::System(e)),
             }
             // Between opening and locking, the owner may have removed the file; then it is another that has to be
@@ -95,7 +96,10 @@ mod tests {
         let path = folder.path().join(".a.lock");
         let lock = Lock::take(&path).unwrap();
         let held = Lock::take(&path).unwrap_err();
-        assert!(matches!(&held, LockError::Held(owner) if *owner == format!("process {}", std::process::id())), "{held:?}");
+        assert!(
+            matches!(&held, LockError::Held(owner) if *owner == format!("process {}", std::process::id())),
+            "{held:?}"
+        );
         drop(lock);
         assert!(!path.exists());
         // Of a killed process.

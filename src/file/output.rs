@@ -77,7 +77,10 @@ pub fn resolve(path: &Path) -> Result<PathBuf> {
 ///
 /// # Errors
 /// [`Error::Output`] if that fails; nothing is left behind.
-pub fn write_atomically(path: &Path, write: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), String>) -> Result<()> {
+pub fn write_atomically(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), String>,
+) -> Result<()> {
     let aside = match place(path).map_err(|e| failed(path, e))? {
         Place::Regular(target) => create_aside(path, &target)?,
         stream => return write_stream(path, &stream, write),
@@ -89,7 +92,10 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut BufWriter<&mut File
 ///
 /// # Errors
 /// As there.
-pub fn write_synchronized(path: &Path, write: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), String>) -> Result<()> {
+pub fn write_synchronized(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), String>,
+) -> Result<()> {
     commit(path, create_aside(path, path)?, true, write)?;
     // The name comes to the disk too. Where folders cannot be synchronised, the system does it in its time.
     let folder = File::open(folder_of(path)).ok();
@@ -97,7 +103,12 @@ pub fn write_synchronized(path: &Path, write: impl FnOnce(&mut BufWriter<&mut Fi
     Ok(())
 }
 
-fn commit(path: &Path, mut aside: Aside, sync: bool, write: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), String>) -> Result<()> {
+fn commit(
+    path: &Path,
+    mut aside: Aside,
+    sync: bool,
+    write: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), String>,
+) -> Result<()> {
     fill(aside.file(), write).map_err(|message| failed(path, message))?;
     let synchronized = if sync { aside.file().sync_data() } else { Ok(()) };
     synchronized.and_then(|()| aside.commit()).map_err(|e| failed(path, e))
@@ -110,7 +121,11 @@ fn fill(file: &mut File, write: impl FnOnce(&mut BufWriter<&mut File>) -> Result
 }
 
 /// Writes to memory, where one can go back and forth, and from there to the stream.
-fn write_stream(path: &Path, place: &Place, write: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), String>) -> Result<()> {
+fn write_stream(
+    path: &Path,
+    place: &Place,
+    write: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), String>,
+) -> Result<()> {
     let memory = rustix::fs::memfd_create("steradian", MemfdFlags::CLOEXEC).map_err(|e| failed(path, e))?;
     let mut memory = File::from(memory);
     fill(&mut memory, write).map_err(|message| failed(path, message))?;

@@ -94,12 +94,20 @@ impl Accumulator {
     pub fn add(&mut self, entry: usize, value: &Values, weight: f32) {
         let weight = f64::from(weight);
         self.color.add(entry, value.color.map(|value| weight * f64::from(value)));
-        value.for_each_average(|k, value| self.average_mut(k).add(entry, value.to_array().map(|value| weight * f64::from(value))));
+        value.for_each_average(|k, value| {
+            self.average_mut(k).add(entry, value.to_array().map(|value| weight * f64::from(value)));
+        });
     }
 
     /// Adds one average of samples; a sample's entry is its pixel.
     #[inline(always)]
-    pub fn add_average(&mut self, index: usize, samples: &[WorldSample], buffer: &mut Vec<f64>, value: impl Fn(&WorldSample) -> Rgb) {
+    pub fn add_average(
+        &mut self,
+        index: usize,
+        samples: &[WorldSample],
+        buffer: &mut Vec<f64>,
+        value: impl Fn(&WorldSample) -> Rgb,
+    ) {
         if samples.iter().any(|at| !value(at).is_black()) {
             let terms = samples.iter().map(|at| at.weighted(value(at).to_array()));
             self.average_mut(index).add_all(buffer, terms);

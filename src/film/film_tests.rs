@@ -3,8 +3,8 @@ use super::*;
 use crate::color::Rgb;
 use crate::desc::{FilterDesc, FilterSamplesDesc};
 use crate::film::{
-    FilmTile, Filter, LayerKind, LightAovRequest, LightAovRows, LightAovSample, PixelSample, Sample, SampleBatch, Splats, SurfaceSample,
-    WorldSample,
+    FilmTile, Filter, LayerKind, LightAovRequest, LightAovRows, LightAovSample, PixelSample, Sample, SampleBatch,
+    Splats, SurfaceSample, WorldSample,
 };
 use crate::math::Vec3;
 
@@ -24,9 +24,12 @@ fn color(film: &Film) -> [f32; 4] {
 /// side.
 #[test]
 fn negative_lobes_overshoot_at_an_edge_without_bias() {
-    let desc = FilterDesc::Mitchell { radius: 2.0, b: 1.0 / 3.0, c: 1.0 / 3.0, samples: Some(FilterSamplesDesc::Importance) };
+    let desc =
+        FilterDesc::Mitchell { radius: 2.0, b: 1.0 / 3.0, c: 1.0 / 3.0, samples: Some(FilterSamplesDesc::Importance) };
     let filter = Filter::new(&desc);
-    let mut film = Film::new(FilmShape { filter: desc, ..FilmShape::new([1, 1], Crop::full([1, 1]), LayerSet::COLOR) }, 16).unwrap();
+    let mut film =
+        Film::new(FilmShape { filter: desc, ..FilmShape::new([1, 1], Crop::full([1, 1]), LayerSet::COLOR) }, 16)
+            .unwrap();
     let edge = -1.0;
     let n = 1024;
     for i in 0..n {
@@ -50,14 +53,24 @@ fn samples_that_are_not_finite_are_dropped_and_counted() {
     let tile = &mut film.tiles_mut()[0];
     let pixel = tile.index(2, 1);
     assert!(tile.add(pixel, 0, &gray(0.25), 1.0));
-    let mut bad = vec![gray(f32::NAN), gray(f32::INFINITY), gray(f32::NEG_INFINITY), PixelSample { alpha: f32::NAN, ..gray(1.0) }];
+    let mut bad = vec![
+        gray(f32::NAN),
+        gray(f32::INFINITY),
+        gray(f32::NEG_INFINITY),
+        PixelSample { alpha: f32::NAN, ..gray(1.0) },
+    ];
     bad.push(PixelSample { radiance: Rgb::new(1.0, f32::INFINITY, f32::NEG_INFINITY), ..gray(0.0) });
     for (i, sample) in bad.iter().enumerate() {
         assert!(!tile.add(pixel, i as u32 + 1, sample, 1.0));
     }
     assert!(!tile.add(pixel, 90, &gray(1.0), f32::NAN));
     let bad_depth = SurfaceSample { depth: f32::NAN, ..SurfaceSample::default() };
-    assert!(!tile.add(pixel, 91, Sample { pixel: &gray(1.0), surface: Some(&bad_depth), light_aovs: LightAovSample::default() }, 1.0));
+    assert!(!tile.add(
+        pixel,
+        91,
+        Sample { pixel: &gray(1.0), surface: Some(&bad_depth), light_aovs: LightAovSample::default() },
+        1.0
+    ));
     let mut bad_aov = LightAovRows::default();
     bad_aov.reset(1, tile.layout.light_aovs);
     bad_aov.add(0, 0, Rgb::new(0.0, f32::NAN, 0.0));
@@ -89,7 +102,12 @@ fn data_is_that_of_the_nearest_sample_and_albedo_is_a_mean() {
     let miss = (PixelSample::default(), SurfaceSample { motion: [5.0, 6.0], ..SurfaceSample::default() });
     for (pixel, samples) in [(0, [(gray(1.0), far), miss, (gray(1.0), near)].as_slice()), (1, &[miss])] {
         for (i, (value, surface)) in (0..).zip(samples) {
-            assert!(tile.add(pixel, i, Sample { pixel: value, surface: Some(surface), light_aovs: LightAovSample::default() }, 1.0));
+            assert!(tile.add(
+                pixel,
+                i,
+                Sample { pixel: value, surface: Some(surface), light_aovs: LightAovSample::default() },
+                1.0
+            ));
         }
     }
     let image = film.resolve();
@@ -100,7 +118,10 @@ fn data_is_that_of_the_nearest_sample_and_albedo_is_a_mean() {
     assert_eq!((at(LayerKind::Motion, 0), at(LayerKind::Motion, 1)), (vec![0.0; 2], vec![5.0, 6.0]));
     assert!((at(LayerKind::Albedo, 0)[0] - 0.4).abs() < 1e-7);
     assert!((at(LayerKind::Color, 0)[3] - 2.0 / 3.0).abs() < 1e-7);
-    assert_eq!((at(LayerKind::Z, 1), at(LayerKind::N, 1), at(LayerKind::P, 1)), (vec![1e10], vec![0.0; 3], vec![0.0; 3]));
+    assert_eq!(
+        (at(LayerKind::Z, 1), at(LayerKind::N, 1), at(LayerKind::P, 1)),
+        (vec![1e10], vec![0.0; 3], vec![0.0; 3])
+    );
 }
 
 #[test]
@@ -111,7 +132,9 @@ fn tiles_lie_on_the_full_pictures_grid() {
     assert_eq!(origins, [[0, 16], [16, 16], [0, 32], [16, 32]]);
     assert_eq!(film.tiles()[3].size(), [16, 8]);
     assert_eq!(film.tiles().iter().map(|tile| tile.active().area()).sum::<u64>(), crop.area());
-    let unused = |tile: &FilmTile| tile.nearest.values.is_empty() && tile.filtered.averages.is_empty() && tile.weights.is_empty();
+    let unused = |tile: &FilmTile| {
+        tile.nearest.values.is_empty() && tile.filtered.averages.is_empty() && tile.weights.is_empty()
+    };
     assert!(film.tiles().iter().all(unused));
 }
 
@@ -120,7 +143,10 @@ fn impossible_films_are_refused() {
     let wide = Crop { x: 8, y: 0, width: 3, height: 1 };
     assert!(matches!(Film::new(FilmShape::new([10, 10], wide, LayerSet::COLOR), 16), Err(Error::Usage(_))));
     let huge = [2_000_000_000, 2_000_000_000];
-    assert!(matches!(Film::new(FilmShape::new(huge, Crop::full(huge), LayerSet::COLOR), 16), Err(Error::OutOfMemory(_))));
+    assert!(matches!(
+        Film::new(FilmShape::new(huge, Crop::full(huge), LayerSet::COLOR), 16),
+        Err(Error::OutOfMemory(_))
+    ));
 }
 
 /// Films whose samples count differently: the mean is the weighted one, the variance that of a weighted mean, all else
@@ -195,7 +221,8 @@ fn shared_samples_give_the_weighted_mean_across_tiles_and_blocks() {
                         let offset = filter.sample([rng.unit_f32(), rng.unit_f32()]).offset;
                         let value = f64::from(x as f32 + 100.0 * y as f32 + 10.0 * rng.unit_f32());
                         let at = [(x as f32, px), (y as f32, py)].map(|(x, p)| x - (p + film.grid().offset) as f32);
-                        let weight = filter.evaluate(crate::math::Vec2::new(at[0], at[1]) + offset) / f64::from(count(x, y));
+                        let weight =
+                            filter.evaluate(crate::math::Vec2::new(at[0], at[1]) + offset) / f64::from(count(x, y));
                         sum += weight * value;
                         whole += weight;
                     }
@@ -213,7 +240,8 @@ fn importance_sampled_pixels_do_not_depend_on_the_samples_of_others() {
     for desc in Filter::EXAMPLES {
         let filter = Filter::new(&desc);
         let picture = |block_size: Option<u32>, others: u32| {
-            let shape = FilmShape { filter: desc, block_size, ..FilmShape::new([8, 8], Crop::full([8, 8]), LayerSet::COLOR) };
+            let shape =
+                FilmShape { filter: desc, block_size, ..FilmShape::new([8, 8], Crop::full([8, 8]), LayerSet::COLOR) };
             let mut film = Film::new(shape, 8).unwrap();
             for (pixel, count) in [(9, 5), (60, others)] {
                 let mut rng = crate::math::Rng::new(pixel as u64);
@@ -256,7 +284,10 @@ fn crops_merges_and_states_of_shared_samples_have_the_same_bits() {
 fn batches_have_the_bits_of_single_samples() {
     let request = LightAovRequest { by_scattering: true, light_groups: 2 };
     let size = [8, 8];
-    let shape = FilmShape { light_groups: vec!["a".into(), "b".into()], ..FilmShape::new(size, Crop::full(size), LayerSet::FULL) };
+    let shape = FilmShape {
+        light_groups: vec!["a".into(), "b".into()],
+        ..FilmShape::new(size, Crop::full(size), LayerSet::FULL)
+    };
     for bad in [None, Some(3), Some(40)] {
         let (mut alone, mut together) = (Film::new(shape.clone(), 8).unwrap(), Film::new(shape.clone(), 8).unwrap());
         let mut rng = crate::math::Rng::new(5);
@@ -266,8 +297,12 @@ fn batches_have_the_bits_of_single_samples() {
             for i in 0..64 {
                 let mut color = || Rgb::new(rng.unit_f32(), rng.unit_f32(), rng.unit_f32());
                 batch.pixels[i] = PixelSample { radiance: color(), alpha: 1.0 };
-                batch.surfaces[i] =
-                    SurfaceSample { albedo: color(), feature_albedo: color(), depth: color().r, ..SurfaceSample::default() };
+                batch.surfaces[i] = SurfaceSample {
+                    albedo: color(),
+                    feature_albedo: color(),
+                    depth: color().r,
+                    ..SurfaceSample::default()
+                };
                 batch.surfaces[i].visible_shape.shape = (color().r * 3.0) as u32;
                 // The others stay black.
                 batch.light_aovs.add(i, 2 * (i % 3), color());

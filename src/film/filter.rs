@@ -136,10 +136,13 @@ impl Filter {
             return FilterSample { offset: Vec2::new(u[0] - 0.5, u[1] - 0.5), weight: 1.0 };
         }
         match &self.kernel {
-            Kernel::Box { radius } => {
-                FilterSample { offset: Vec2::new((2.0 * u[0] - 1.0) * radius, (2.0 * u[1] - 1.0) * radius), weight: 1.0 }
+            Kernel::Box { radius } => FilterSample {
+                offset: Vec2::new((2.0 * u[0] - 1.0) * radius, (2.0 * u[1] - 1.0) * radius),
+                weight: 1.0,
+            },
+            Kernel::Tent { radius } => {
+                FilterSample { offset: Vec2::new(tent(u[0]) * radius, tent(u[1]) * radius), weight: 1.0 }
             }
-            Kernel::Tent { radius } => FilterSample { offset: Vec2::new(tent(u[0]) * radius, tent(u[1]) * radius), weight: 1.0 },
             Kernel::Table(table) => table.sample(&self.desc, u),
         }
     }
@@ -229,7 +232,8 @@ impl Filter {
             (0..STEPS).map(|i| term(-radius + (i as f64 + 0.5) * h) * h).sum()
         };
         let own = covariance(0.0);
-        1.0 + 2.0 * (1..=(2.0 * radius) as u32).map(|distance| (covariance(f64::from(distance)) / own).powi(2)).sum::<f64>()
+        1.0 + 2.0
+            * (1..=(2.0 * radius) as u32).map(|distance| (covariance(f64::from(distance)) / own).powi(2)).sum::<f64>()
     }
 }
 
@@ -237,7 +241,9 @@ impl VarianceKernel {
     /// Calls `f` with every pixel around one within a rectangle, and the kernel there.
     pub fn for_each(&self, area: Crop, [x, y]: [u32; 2], mut f: impl FnMut([u32; 2], f64, f64)) {
         let border = (self.means.len() / 2) as u32;
-        let around = |at: u32, start: u32, length: u32| at.saturating_sub(border).max(start)..(at + border + 1).min(start + length);
+        let around = |at: u32, start: u32, length: u32| {
+            at.saturating_sub(border).max(start)..(at + border + 1).min(start + length)
+        };
         for row in around(y, area.y, area.height) {
             for column in around(x, area.x, area.width) {
                 let [i, j] = [column + border - x, row + border - y].map(|i| i as usize);
@@ -250,8 +256,10 @@ impl VarianceKernel {
 impl SharedWeights {
     fn new(desc: &FilterDesc) -> Self {
         let radius = f64::from(desc.radius());
-        let half: f64 =
-            (0..STEPS).map(|i| (i as f64 + 0.5) * radius / STEPS as f64).map(|x| evaluate(desc, x) * radius / STEPS as f64).sum();
+        let half: f64 = (0..STEPS)
+            .map(|i| (i as f64 + 0.5) * radius / STEPS as f64)
+            .map(|x| evaluate(desc, x) * radius / STEPS as f64)
+            .sum();
         let border = (radius - 0.5).ceil() as i32;
         let count = Some((2.0 * radius).ceil() as usize).filter(|count| *count <= 4).unwrap_or(MAX_TAPS);
         let (mut first, mut weights) = ([0; OFFSET_CELLS], Vec::with_capacity(2 * OFFSET_CELLS * count));
@@ -260,7 +268,11 @@ impl SharedWeights {
             let pixel = ((ends[0] - radius).floor() as i32 + 1).min(border + 1 - count as i32).max(-border);
             *first = pixel as i8;
             let weight = |k: usize, end: f64| {
-                if pixel + k as i32 > border { 0.0 } else { evaluate(desc, f64::from(pixel + k as i32) - end) / (2.0 * half) }
+                if pixel + k as i32 > border {
+                    0.0
+                } else {
+                    evaluate(desc, f64::from(pixel + k as i32) - end) / (2.0 * half)
+                }
             };
             weights.extend((0..count).map(|k| weight(k, ends[0]) as f32));
             weights.extend((0..count).map(|k| (weight(k, ends[1]) - weight(k, ends[0])) as f32));

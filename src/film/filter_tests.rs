@@ -50,7 +50,9 @@ fn weighted_moments_match_the_filter() {
         let total = integral(&desc, -r, r, |f| f);
         let steps = 20_000;
         let h = 2.0 * r / f64::from(steps);
-        let variance: f64 = (0..steps).map(|i| -r + (f64::from(i) + 0.5) * h).map(|x| evaluate(&desc, x) * x * x * h).sum::<f64>() / total;
+        let variance: f64 =
+            (0..steps).map(|i| -r + (f64::from(i) + 0.5) * h).map(|x| evaluate(&desc, x) * x * x * h).sum::<f64>()
+                / total;
         let side = 1024;
         let (mut mean, mut second, mut weights) = (0.0, 0.0, 0.0);
         for i in 0..side {
@@ -98,14 +100,20 @@ fn weights_of_shared_samples_are_the_filters() {
         for i in 0..count {
             let offset = (i as f32 + 0.5) / count as f32 - 0.5;
             let taps = filter.taps(offset);
-            assert!(taps.first >= -border && taps.first + taps.count as i32 <= border + 1, "{desc:?} {offset}: {taps:?}");
+            assert!(
+                taps.first >= -border && taps.first + taps.count as i32 <= border + 1,
+                "{desc:?} {offset}: {taps:?}"
+            );
             for pixel in -border..=border {
                 let k = (pixel - taps.first) as usize;
                 let weight = if k < taps.count { taps.weights[k] } else { 0.0 };
                 let x = (f64::from(pixel) - f64::from(offset)).abs();
                 // Within a cell of the support's end, kinks are smoothed.
                 if (x - r).abs() > 1.0 / OFFSET_CELLS as f64 {
-                    assert!((f64::from(weight) - evaluate(&desc, x) / total).abs() < 3e-5, "{desc:?} {offset} {pixel}: {weight}");
+                    assert!(
+                        (f64::from(weight) - evaluate(&desc, x) / total).abs() < 3e-5,
+                        "{desc:?} {offset} {pixel}: {weight}"
+                    );
                 }
                 sum += f64::from(weight) / f64::from(count);
             }

@@ -131,7 +131,8 @@ impl Identities {
 
     /// Whether every placement comes after the one around it, as those of scenes do: none is around itself.
     pub fn is_ordered(&self) -> bool {
-        let comes_before = |(i, placement): (usize, &Placement)| placement.parent.is_none_or(|parent| parent.0.get() as usize <= i);
+        let comes_before =
+            |(i, placement): (usize, &Placement)| placement.parent.is_none_or(|parent| parent.0.get() as usize <= i);
         self.placements.iter().enumerate().all(comes_before)
     }
 

@@ -193,8 +193,8 @@ impl LayerInfo {
             "motion",
             &["motion.X", "motion.Y"],
             LayerSource::Surface(|s, out| out.copy_from_slice(&s.motion), Filtering::Nearest),
-            "motion: of the nearest sample, from where the surface is when the shutter opens to where it is when it closes, in pixels to the right and down; without a \
-             surface, that of a point infinitely far away",
+            "motion: of the nearest sample, from where the surface is when the shutter opens to where it is when it \
+             closes, in pixels to the right and down; without a surface, that of a point infinitely far away",
         )
         .float(),
         Self::new(
@@ -227,7 +227,14 @@ impl LayerInfo {
             "variance: of the filtered picture's R, G and B, their expected squared error",
         )
         .float(),
-        Self::new(LayerKind::Samples, "samples", &["stats.samples"], LayerSource::Film, "stats.samples: samples of the pixel").float(),
+        Self::new(
+            LayerKind::Samples,
+            "samples",
+            &["stats.samples"],
+            LayerSource::Film,
+            "stats.samples: samples of the pixel",
+        )
+        .float(),
         Self::new(
             LayerKind::FeatureAlbedo,
             "feature_albedo",
@@ -309,7 +316,8 @@ impl LayerSet {
     /// Only the colour.
     pub const COLOR: Self = Self { bits: 0 };
     /// Every layer that a render fills.
-    pub const FULL: Self = Self { bits: ((1 << LayerInfo::ALL.len()) - 1) & !layers_from!(LayerSource::Denoiser) & !Self::COLOR_BIT };
+    pub const FULL: Self =
+        Self { bits: ((1 << LayerInfo::ALL.len()) - 1) & !layers_from!(LayerSource::Denoiser) & !Self::COLOR_BIT };
     /// Never set, so that equal sets have equal bits.
     const COLOR_BIT: u32 = 1 << LayerKind::Color as u32;
 
@@ -412,10 +420,16 @@ mod tests {
     #[test]
     fn a_set_holds_what_was_put_in_and_always_the_colour() {
         let set: LayerSet = [LayerKind::P, LayerKind::Z].into_iter().collect();
-        assert_eq!(set.iter().map(|info| info.kind).collect::<Vec<_>>(), [LayerKind::Color, LayerKind::Z, LayerKind::P]);
+        assert_eq!(
+            set.iter().map(|info| info.kind).collect::<Vec<_>>(),
+            [LayerKind::Color, LayerKind::Z, LayerKind::P]
+        );
         assert!(set.needs_surface() && !LayerSet::COLOR.needs_surface());
         assert!(LayerSet::COLOR.contains(LayerKind::Color));
-        assert_eq!([LayerKind::Albedo, LayerKind::Samples].iter().collect::<LayerSet>().surfaces(Filtering::Mean).count(), 1);
+        assert_eq!(
+            [LayerKind::Albedo, LayerKind::Samples].iter().collect::<LayerSet>().surfaces(Filtering::Mean).count(),
+            1
+        );
         assert!(!LayerSet::from_iter(&[LayerKind::Variance, LayerKind::Samples]).needs_surface());
         assert_eq!(LayerSet::FULL.iter().count(), LayerInfo::ALL.len() - 1);
         assert!(LayerSet::from_iter(&[LayerKind::CryptoObject]).needs_coverage() && !set.needs_coverage());

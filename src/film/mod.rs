@@ -26,7 +26,9 @@ pub use filter::{Filter, FilterSample, Taps, VarianceKernel};
 pub use identities::{Identities, Label, NameId, PlacementId, ShapeIdentity};
 pub use image::{Crop, Image, Layer};
 pub use layer::{Filtering, LayerInfo, LayerSet, LayerSource};
-pub use sample::{LightAov, LightAovRequest, LightAovRows, LightAovSample, PixelSample, Sample, SampleBatch, ShapeKey, SurfaceSample};
+pub use sample::{
+    LightAov, LightAovRequest, LightAovRows, LightAovSample, PixelSample, Sample, SampleBatch, ShapeKey, SurfaceSample,
+};
 pub use splats::Splats;
 pub use sum::SumPlane;
 pub use tile::{DroppedSample, FilmTile, WorldSample};

@@ -1,7 +1,9 @@
 //! From the sums of a film to the picture.
 
 use super::tile::FilmTile;
-use super::{Coverage, Film, Filtering, Image, Layer, LayerInfo, LayerKind, LayerSource, Layout, ShapeKey, VarianceKernel};
+use super::{
+    Coverage, Film, Filtering, Image, Layer, LayerInfo, LayerKind, LayerSource, Layout, ShapeKey, VarianceKernel,
+};
 
 /// Depth where nothing was hit.
 const MISS_DEPTH: f32 = 1e10;
@@ -56,7 +58,8 @@ impl<'a> Estimator<'a> {
         }
         let count = tile.count_at(pixel);
         self.expected = if is_scaled { 1.0 } else { count };
-        self.weight = if film.layout.is_weighted() { self.sum(|tile, entry| tile.weights.values(entry)[0]) } else { count };
+        self.weight =
+            if film.layout.is_weighted() { self.sum(|tile, entry| tile.weights.values(entry)[0]) } else { count };
         true
     }
 
@@ -165,7 +168,9 @@ impl Film {
                         estimator.average(first, out);
                     }
                     LayerSource::Surface(_, Filtering::Nearest) => estimator.data(info, first, out),
-                    LayerSource::Film if info.kind == LayerKind::Samples => out[0] = estimator.own.0.samples[estimator.own.1] as f32,
+                    LayerSource::Film if info.kind == LayerKind::Samples => {
+                        out[0] = estimator.own.0.samples[estimator.own.1] as f32;
+                    }
                     LayerSource::Film => out.copy_from_slice(&self.variance(&kernel, x, y).map(to_f32)),
                     LayerSource::Coverage | LayerSource::Denoiser => {}
                 }
@@ -192,7 +197,8 @@ impl Film {
 
     /// The picture's layers, and of those of groups of lights, which.
     fn stored(&self) -> impl Iterator<Item = (LayerKind, Option<usize>)> + '_ {
-        let all = self.layout.set.iter().filter(|info| !matches!(info.source, LayerSource::Coverage | LayerSource::Denoiser));
+        let all =
+            self.layout.set.iter().filter(|info| !matches!(info.source, LayerSource::Coverage | LayerSource::Denoiser));
         all.flat_map(|info| {
             let is_group = matches!(info.source, LayerSource::LightGroups);
             let groups = if is_group { self.layout.light_aovs.light_groups as usize } else { 1 };

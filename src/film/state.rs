@@ -38,7 +38,8 @@ impl FilmTile {
     /// # Errors
     /// What is wrong if the bytes are not those of such a tile; the tile is then of no use.
     pub fn load(&mut self, bytes: &[u8]) -> Result<(), String> {
-        self.read(&mut ByteReader::new(bytes)).ok_or_else(|| format!("the tile at {:?} is not what was saved of it", self.origin()))
+        self.read(&mut ByteReader::new(bytes))
+            .ok_or_else(|| format!("the tile at {:?} is not what was saved of it", self.origin()))
     }
 
     fn read(&mut self, data: &mut ByteReader) -> Option<()> {

@@ -177,7 +177,9 @@ impl FilmTile {
 
     /// Adds samples to the sums, one plane after the other.
     fn add_planes(&mut self, batch: &SampleBatch, samples: &[WorldSample], buffer: &mut Vec<f64>) {
-        self.filtered.color.add_all(buffer, samples.iter().map(|at| at.weighted(batch.pixels[at.slot as usize].to_array())));
+        self.filtered
+            .color
+            .add_all(buffer, samples.iter().map(|at| at.weighted(batch.pixels[at.slot as usize].to_array())));
         if !self.weights.is_empty() {
             self.weights.add_all(buffer, samples.iter().map(|at| at.weighted([1.0])));
         }
@@ -212,7 +214,13 @@ impl FilmTile {
 
     /// [`add`](Self::add) where nothing but the colour is kept, and all samples have the same weight.
     #[inline(always)]
-    fn add_color(&mut self, pixel: usize, sample: u32, PixelSample { radiance, alpha }: &PixelSample, weight: f32) -> bool {
+    fn add_color(
+        &mut self,
+        pixel: usize,
+        sample: u32,
+        PixelSample { radiance, alpha }: &PixelSample,
+        weight: f32,
+    ) -> bool {
         if !is_finite(weight, *radiance, *alpha) {
             self.drop_sample(pixel, sample);
             return false;
@@ -228,7 +236,14 @@ impl FilmTile {
     /// [`Filter::splat_taps`](super::Filter::splat_taps).
     /// `splats` collects samples of one cell, and [`flush`](Self::flush) adds them to the tile.
     #[inline]
-    pub fn splat<'a>(&mut self, pixel: usize, sample: u32, value: impl Into<Sample<'a>>, taps: &[Taps; 2], splats: &mut Splats) -> bool {
+    pub fn splat<'a>(
+        &mut self,
+        pixel: usize,
+        sample: u32,
+        value: impl Into<Sample<'a>>,
+        taps: &[Taps; 2],
+        splats: &mut Splats,
+    ) -> bool {
         let value = value.into();
         // A sum of as many terms as a pixel has neighbours is to be finite, too.
         let Some(values) = self.take(pixel, sample, value, Splats::MOST_TERMS) else { return false };
@@ -258,7 +273,8 @@ impl FilmTile {
             means: [Rgb::BLACK; MAX_MEANS],
             first_mean: self.layout.light_aovs.count(),
         };
-        let mut finite = is_finite(weight, *radiance, *alpha) && surface.is_none_or(|surface| surface.magnitude().is_finite());
+        let mut finite =
+            is_finite(weight, *radiance, *alpha) && surface.is_none_or(|surface| surface.magnitude().is_finite());
         if self.layout.beside_color() {
             values.light_aovs = light_aovs;
             if let Some(surface) = surface {
@@ -314,7 +330,9 @@ impl FilmTile {
 
     /// The mean radiance of a pixel's own groups.
     pub fn mean(&self, pixel: usize) -> [f64; 3] {
-        let mean = |moments: &SampleMoments| moments.sums.values(pixel).map(|sum| sum / f64::from(moments.groups[pixel].max(1)));
+        let mean = |moments: &SampleMoments| {
+            moments.sums.values(pixel).map(|sum| sum / f64::from(moments.groups[pixel].max(1)))
+        };
         self.moments.as_ref().map_or([0.0; 3], mean)
     }
 
@@ -355,7 +373,8 @@ impl FilmTile {
                 for k in 0..3 {
                     let own = weighed.variance[k];
                     let other = known.map_or(own * ours / theirs.max(f64::MIN_POSITIVE), |variance| variance[k]);
-                    weighed.variance[k] = (ours * ours * own + theirs * theirs * other) / (weighed.count * weighed.count);
+                    weighed.variance[k] =
+                        (ours * ours * own + theirs * theirs * other) / (weighed.count * weighed.count);
                 }
             }
         }

@@ -104,7 +104,8 @@ impl Layout {
     fn new(set: LayerSet, light_groups: usize, filter: &Filter, cell_size: u32) -> Self {
         let light_groups = if set.contains(LayerKind::LightGroups) { light_groups as u32 } else { 0 };
         let light_aovs = LightAovRequest { by_scattering: set.needs_light_aovs(), light_groups };
-        let [means, nearest] = [Filtering::Mean, Filtering::Nearest].map(|filtering| SurfaceChannels::new(set, filtering));
+        let [means, nearest] =
+            [Filtering::Mean, Filtering::Nearest].map(|filtering| SurfaceChannels::new(set, filtering));
         Self { set, light_aovs, means, nearest, cell_size, border: filter.border(), signed: filter.is_signed() }
     }
 
@@ -153,7 +154,10 @@ impl Film {
         let (size, crop) = (shape.size, shape.crop);
         if !crop.fits(size) {
             let Crop { x, y, width, height } = crop;
-            return Err(Error::Usage(format!("crop {x},{y},{width},{height} does not fit a picture of {}x{} pixels", size[0], size[1])));
+            return Err(Error::Usage(format!(
+                "crop {x},{y},{width},{height} does not fit a picture of {}x{} pixels",
+                size[0], size[1]
+            )));
         }
         let filter = Filter::new(&shape.filter);
         let tile_size = tile_size.max(1);

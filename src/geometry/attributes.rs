@@ -10,11 +10,9 @@ impl Mesh {
     /// This mesh with attributes: as many values as vertices or triangles.
     #[must_use]
     pub fn with_attributes(mut self, attributes: Vec<Attribute>) -> Self {
-        debug_assert!(
-            attributes.iter().all(|attribute| {
-                attribute.values.len() == if attribute.of_faces { self.triangles.len() } else { self.positions().len() }
-            })
-        );
+        debug_assert!(attributes.iter().all(|attribute| {
+            attribute.values.len() == if attribute.of_faces { self.triangles.len() } else { self.positions().len() }
+        }));
         self.attributes = attributes.into();
         self
     }
@@ -43,7 +41,8 @@ impl Geometry {
         if !mesh.has_attributes() {
             return None;
         }
-        let p = if at.is_instanced() { self.instance(at.instance).transform_at(at.time).inverse_point(at.p) } else { at.p };
+        let p =
+            if at.is_instanced() { self.instance(at.instance).transform_at(at.time).inverse_point(at.p) } else { at.p };
         Some(mesh.attribute_point(at.prim, mesh.weights_at(at.prim, p, at.time).map(|weight| weight as f32)))
     }
 }
@@ -67,7 +66,8 @@ mod tests {
     const COLORS: [[f32; 3]; 3] = [[1.0, 0.25, 0.0], [0.0, 0.5, 0.0], [0.5, 0.0, 1.0]];
 
     fn triangle() -> Mesh {
-        let colors = Attribute { id: AttributeId(3), of_faces: false, values: AttributeValues::Colors(COLORS.to_vec()) };
+        let colors =
+            Attribute { id: AttributeId(3), of_faces: false, values: AttributeValues::Colors(COLORS.to_vec()) };
         Mesh::new(CORNERS.to_vec(), vec![[0, 1, 2]], None, None).unwrap().with_attributes(vec![colors])
     }
 
@@ -80,7 +80,8 @@ mod tests {
     fn seen(mesh: Mesh, target: Vec3, time: f32, map: Option<DAffine3>) -> Vec3 {
         let mut geometry = Geometry { shapes: vec![Shape::Mesh(mesh)], ..Geometry::default() };
         let place = map.unwrap_or(DAffine3::IDENTITY);
-        let (origin, toward) = (place.transform_point3(target.as_dvec3() + DVec3::Z), place.transform_vector3(-DVec3::Z));
+        let (origin, toward) =
+            (place.transform_point3(target.as_dvec3() + DVec3::Z), place.transform_vector3(-DVec3::Z));
         let ray = Ray { time, ..Ray::new(origin.as_vec3(), toward.as_vec3()) };
         let mut hit = Hit { t: 1.0, u: 0.0, v: 0.0, shape: ShapeId(0), prim: PrimId(0), instance: Hit::NO_INSTANCE };
         if let Some(map) = map {

@@ -101,7 +101,8 @@ mod tests {
             let n = 100_000;
             let counted = (0..n).filter(|&i| {
                 let ray = Ray::new(Vec3::new(i as f32, 0.0, 0.0), Vec3::Z);
-                let hit = Hit { t: 1.0, u: 0.0, v: 0.0, shape: ShapeId(0), prim: PrimId(i % 7), instance: InstanceId(3) };
+                let hit =
+                    Hit { t: 1.0, u: 0.0, v: 0.0, shape: ShapeId(0), prim: PrimId(i % 7), instance: InstanceId(3) };
                 is_covered(coverage, ray_key(&ray), &hit)
             });
             let fraction = counted.count() as f32 / n as f32;
@@ -116,7 +117,14 @@ mod tests {
         let n = 40_000;
         let both = (0..n).filter(|&i| {
             let key = ray_key(&Ray::new(Vec3::new(0.0, i as f32, 0.0), Vec3::Z));
-            let hit = |prim| Hit { t: 1.0, u: 0.0, v: 0.0, shape: ShapeId(1), prim: PrimId(prim), instance: Hit::NO_INSTANCE };
+            let hit = |prim| Hit {
+                t: 1.0,
+                u: 0.0,
+                v: 0.0,
+                shape: ShapeId(1),
+                prim: PrimId(prim),
+                instance: Hit::NO_INSTANCE,
+            };
             is_covered(0.5, key, &hit(0)) && is_covered(0.5, key, &hit(1))
         });
         let fraction = both.count() as f64 / f64::from(n);

@@ -52,7 +52,8 @@ impl Disk {
         let t = -ray.origin.z / ray.direction.z;
         let (x, y) = (ray.origin.x + ray.direction.x * t, ray.origin.y + ray.direction.y * t);
         let rho_squared = x * x + y * y;
-        let in_ring = (self.inner_radius * self.inner_radius <= rho_squared) & (rho_squared <= self.radius * self.radius);
+        let in_ring =
+            (self.inner_radius * self.inner_radius <= rho_squared) & (rho_squared <= self.radius * self.radius);
         let is_hit = ray.contains(t) & t.is_finite() & in_ring & self.sector.contains(x, y);
         if is_hit { t } else { f64::NAN }
     }
@@ -128,7 +129,12 @@ mod tests {
         let disk = Disk::new(1.0, 0.0, 6.0).unwrap();
         for z in [0.0, -0.0, 0.5] {
             for dz in [0.0, -0.0] {
-                let ray = RayF64 { origin: dvec3(-2.0, 0.0, z), direction: dvec3(1.0, 0.0, dz), t_min: 0.0, t_max: f64::INFINITY };
+                let ray = RayF64 {
+                    origin: dvec3(-2.0, 0.0, z),
+                    direction: dvec3(1.0, 0.0, dz),
+                    t_min: 0.0,
+                    t_max: f64::INFINITY,
+                };
                 assert!(disk.distance(&ray).is_nan());
             }
         }

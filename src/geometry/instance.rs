@@ -50,7 +50,8 @@ impl Instance {
     /// Whether the map stretches so unevenly that an inverse made in `f32` exceeds the bound of
     /// [`SurfaceInteraction::error`].
     pub fn is_uneven(&self) -> bool {
-        let squared_norm = |m: &DMat3| m.x_axis.length_squared() + m.y_axis.length_squared() + m.z_axis.length_squared();
+        let squared_norm =
+            |m: &DMat3| m.x_axis.length_squared() + m.y_axis.length_squared() + m.z_axis.length_squared();
         // The product is 9 for a rotation with a scale; the square of the limit is that of a stretch by about 8 along
         // one axis.
         let Transform { world_from_object, object_from_world, .. } = &self.transform;
@@ -111,7 +112,13 @@ impl Instance {
 
     /// The interaction of a hit of the world-space `ray` with a shape of the object.
     #[inline(never)]
-    pub(super) fn interaction(&self, shape: &Shape, detail: Detail, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
+    pub(super) fn interaction(
+        &self,
+        shape: &Shape,
+        detail: Detail,
+        ray: &Ray,
+        hit: &Hit,
+    ) -> Option<SurfaceInteraction> {
         let local_ray = self.object_ray(ray);
         let local = shape.interaction(detail, &local_ray, hit)?;
         let t = &*self.transform_at(ray.time);
@@ -125,11 +132,15 @@ impl Instance {
         // normal.
         let inverse = &t.object_from_world;
         let m = &inverse.matrix3;
-        let moved = m.x_axis.abs() * p.x.abs() + m.y_axis.abs() * p.y.abs() + m.z_axis.abs() * p.z.abs() + inverse.translation.abs();
+        let moved = m.x_axis.abs() * p.x.abs()
+            + m.y_axis.abs() * p.y.abs()
+            + m.z_axis.abs() * p.z.abs()
+            + inverse.translation.abs();
         let stretch = 1.0 / n_world.length();
         let along = n_local.abs().dot(moved) * stretch;
-        let error =
-            4.0 * UNIT_ROUNDOFF * along + f64::from(local.error) * stretch + UNIT_ROUNDOFF * n_local.abs().dot(local.p.abs()) * stretch;
+        let error = 4.0 * UNIT_ROUNDOFF * along
+            + f64::from(local.error) * stretch
+            + UNIT_ROUNDOFF * n_local.abs().dot(local.p.abs()) * stretch;
 
         Some(SurfaceInteraction {
             p,

@@ -155,7 +155,10 @@ mod tests {
             for side in [1f32, -1.0] {
                 let origin = point(p, n).spawn(n * side).origin;
                 assert!((origin.as_dvec3() - p).dot(n.as_dvec3()) * f64::from(side) > 0.0, "{scale} {side}");
-                assert!((origin.as_dvec3() - p).length() < 6.0 * f64::from(f32::EPSILON) * p.length(), "{scale} {side}");
+                assert!(
+                    (origin.as_dvec3() - p).length() < 6.0 * f64::from(f32::EPSILON) * p.length(),
+                    "{scale} {side}"
+                );
             }
         }
     }

@@ -3,6 +3,7 @@
 use std::sync::OnceLock;
 
 use super::attributes::weights;
+use super::mesh_error::MeshError;
 use super::tangents::{self, CornerTangents};
 pub use super::triangle::TrianglePoints;
 use super::uv::{derivatives, interpolated_uv, uv_area};
@@ -11,43 +12,6 @@ use crate::attribute::Attribute;
 use crate::id::PrimId;
 use crate::math::float::{EMBREE_LARGE, UNIT_ROUNDOFF};
 use crate::math::{Aabb, Bounds, DVec3, Ray, Transform, Vec2, Vec3};
-
-/// Why a mesh is rejected; indices count from 0.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum MeshError {
-    /// No triangles at all.
-    #[error("the mesh has no triangles")]
-    Empty,
-    /// A position that is not finite, or too large for `f32` ray tracing.
-    #[error("vertex {0} is not finite or exceeds 1.8e18")]
-    Position(usize),
-    /// A normal that is not finite.
-    #[error("the normal of vertex {0} is not finite")]
-    Normal(usize),
-    /// A uv that is not finite.
-    #[error("the uv of vertex {0} is not finite")]
-    Uv(usize),
-    /// A corner that names no vertex.
-    #[error("triangle {triangle} refers to vertex {index}, but there are only {count}")]
-    Index {
-        /// The triangle.
-        triangle: usize,
-        /// The vertex it names.
-        index: u32,
-        /// The number of vertices.
-        count: usize,
-    },
-    /// Normals or uvs that do not match the positions in number.
-    #[error("{what}: {count} for {vertices} vertices")]
-    Count {
-        /// Which attribute.
-        what: &'static str,
-        /// How many there are.
-        count: usize,
-        /// How many there must be.
-        vertices: usize,
-    },
-}
 
 /// An indexed triangle mesh, validated: every number is finite, every index in range.
 #[derive(Clone, Debug)]
@@ -148,7 +112,11 @@ impl Mesh {
         let mut has_slivers = self.has_slivers;
         for step in later {
             if step.positions.len() != vertices {
-                return Err(MeshError::Count { what: "positions at a later time", count: step.positions.len(), vertices });
+                return Err(MeshError::Count {
+                    what: "positions at a later time",
+                    count: step.positions.len(),
+                    vertices,
+                });
             }
             let normals = step.normals.filter(|_| self.has_normals());
             if self.has_normals() && normals.is_none() {
@@ -224,7 +192,9 @@ impl Mesh {
     /// Bounds of one triangle over the whole shutter interval.
     pub fn triangle_bounds(&self, prim: PrimId) -> Aabb {
         let corners = self.triangles[prim.index()];
-        let of = |bounds: Aabb, positions: &[[f32; 3]]| corners.iter().fold(bounds, |b, &i| b.extended(Vec3::from(positions[i as usize])));
+        let of = |bounds: Aabb, positions: &[[f32; 3]]| {
+            corners.iter().fold(bounds, |b, &i| b.extended(Vec3::from(positions[i as usize])))
+        };
         let moved = self.padded_steps().fold(Aabb::EMPTY, of);
         if !self.is_deforming() {
             return moved;
@@ -302,9 +272,13 @@ impl Mesh {
     pub fn bounds(&self) -> Aabb {
         *self.bounds.get_or_init(|| {
             if self.is_deforming() {
-                return (0..self.triangles.len()).fold(Aabb::EMPTY, |b, i| b.union(&self.triangle_bounds(PrimId::new(i))));
+                return (0..self.triangles.len())
+                    .fold(Aabb::EMPTY, |b, i| b.union(&self.triangle_bounds(PrimId::new(i))));
             }
-            self.triangles.iter().flatten().fold(Aabb::EMPTY, |b, &i| b.extended(Vec3::from(self.positions[i as usize])))
+            self.triangles
+                .iter()
+                .flatten()
+                .fold(Aabb::EMPTY, |b, &i| b.extended(Vec3::from(self.positions[i as usize])))
         })
     }
 
@@ -313,11 +287,18 @@ impl Mesh {
         let normals = self.normals.as_ref().map_or(0, |n| size_of_val(n.as_slice()));
         let uvs = self.uvs.as_ref().map_or(0, |n| size_of_val(n.as_slice()));
         let attributes: usize = self.attributes.iter().map(|attribute| size_of_val(attribute.values.numbers())).sum();
-        let of_step =
-            |step: &MeshStep| size_of_val(step.positions.as_slice()) + step.normals.as_ref().map_or(0, |n| size_of_val(n.as_slice()));
+        let of_step = |step: &MeshStep| {
+            size_of_val(step.positions.as_slice()) + step.normals.as_ref().map_or(0, |n| size_of_val(n.as_slice()))
+        };
         let later: usize = self.later.iter().map(of_step).sum();
         let tangents: usize = self.tangents.iter().map(|t| size_of_val(t.as_slice())).sum();
-        size_of_val(self.positions.as_slice()) + size_of_val(self.triangles.as_slice()) + normals + uvs + attributes + later + tangents
+        size_of_val(self.positions.as_slice())
+            + size_of_val(self.triangles.as_slice())
+            + normals
+            + uvs
+            + attributes
+            + later
+            + tangents
     }
 
     /// The interaction for a hit of `ray`; see [`Geometry::interaction`](super::Geometry::interaction).
@@ -328,7 +309,12 @@ impl Mesh {
 
     /// The interaction with the change of the point with v.
     #[inline(always)]
-    pub(super) fn interaction_and_dp_dv(&self, detail: Detail, ray: &Ray, hit: &Hit) -> Option<(SurfaceInteraction, Vec3)> {
+    pub(super) fn interaction_and_dp_dv(
+        &self,
+        detail: Detail,
+        ray: &Ray,
+        hit: &Hit,
+    ) -> Option<(SurfaceInteraction, Vec3)> {
         let points = self.triangle_points_at(hit.prim, ray.time);
 
         let place = points.place(ray.origin, ray.direction);
@@ -343,7 +329,11 @@ impl Mesh {
         }
 
         let (n_s, length) = self.shading_normal(hit, n_g, ray.time);
-        let parameters = if detail == Detail::Full { self.parameters(hit, &points, n_s, length, ray.time) } else { Parameters::default() };
+        let parameters = if detail == Detail::Full {
+            self.parameters(hit, &points, n_s, length, ray.time)
+        } else {
+            Parameters::default()
+        };
         let at = SurfaceInteraction {
             p,
             t: place.t as f32,

@@ -9,6 +9,7 @@ mod hit;
 mod instance;
 mod interaction;
 mod mesh;
+mod mesh_error;
 mod moving;
 mod placed;
 mod profile;
@@ -30,10 +31,11 @@ pub use hit::Hit;
 pub use instance::{Instance, InverseReach, Object};
 pub use interaction::{Detail, SpawnPoint, SurfaceInteraction};
 pub(crate) use mesh::interpolated_normal;
-pub use mesh::{Mesh, MeshError, MeshStep, TrianglePoints};
+pub use mesh::{Mesh, MeshStep, TrianglePoints};
+pub use mesh_error::MeshError;
 pub use placed::{
-    Analytic, LocalHit, LocalSurface, PACKET_SIZE, PacketHits, RayPacket, ShapeSample, SurfacePoint, TransformedShape, WorldNormalRows,
-    WorldPointRows, WorldSampleRows,
+    Analytic, LocalHit, LocalSurface, PACKET_SIZE, PacketHits, RayPacket, ShapeSample, SurfacePoint, TransformedShape,
+    WorldNormalRows, WorldPointRows, WorldSampleRows,
 };
 pub use profile::Profile;
 pub use quad::Quad;

@@ -24,7 +24,8 @@ impl Geometry {
         if let Some(hit) = hit.filter(|hit| (hit.instance, hit.shape, hit.prim) == at.ids()) {
             return mesh.uv(at.prim, hit.u, hit.v);
         }
-        let local = if at.is_instanced() { self.instance(at.instance).transform_at(at.time).inverse_point(at.p) } else { at.p };
+        let local =
+            if at.is_instanced() { self.instance(at.instance).transform_at(at.time).inverse_point(at.p) } else { at.p };
         let [_, u, v] = mesh.weights_at(at.prim, local, at.time);
         mesh.uv(at.prim, u as f32, v as f32)
     }
@@ -94,14 +95,18 @@ mod tests {
 
     #[test]
     fn points_turn_and_shift_with_their_instance() {
-        let sphere = Shape::Analytic(TransformedShape::new(Analytic::Sphere(Sphere::full(1.0).unwrap()), Transform::IDENTITY));
+        let sphere =
+            Shape::Analytic(TransformedShape::new(Analytic::Sphere(Sphere::full(1.0).unwrap()), Transform::IDENTITY));
         let later = DAffine3::from_translation(DVec3::new(2.0, 0.0, 0.0)) * DAffine3::from_rotation_z(1.0);
         let geometry = instanced(sphere, Motion::keyframed(&[(0.0, DAffine3::IDENTITY), (1.0, later)]).unwrap());
         // Halfway, the sphere stands at x = 1 and has turned by 0.5.
         let at = seen(&geometry, &down(1.5, 0.25, 0.5), InstanceId(0));
         let local = DAffine3::from_rotation_z(-0.5).transform_point3(at.p - DVec3::X);
         let [open, close] = geometry.ends_of_motion(&at);
-        assert!((open - local).length() < 1e-6 && (close - later.transform_point3(local)).length() < 1e-6, "{open} {close}");
+        assert!(
+            (open - local).length() < 1e-6 && (close - later.transform_point3(local)).length() < 1e-6,
+            "{open} {close}"
+        );
     }
 
     #[test]
@@ -109,7 +114,8 @@ mod tests {
         // Corner b moves by x = 2 in the first half, and stays; c moves by z = 1 in the second.
         let step = |b: f32, c: f32| MeshStep { positions: vec![[0.0; 3], [b, 0.0, 0.0], [0.0, 4.0, c]], normals: None };
         let mesh = triangle().deforming(vec![step(6.0, 0.0), step(6.0, 1.0)]).unwrap();
-        let lift = Motion::keyframed(&[(0.0, DAffine3::IDENTITY), (1.0, DAffine3::from_translation(DVec3::Z))]).unwrap();
+        let lift =
+            Motion::keyframed(&[(0.0, DAffine3::IDENTITY), (1.0, DAffine3::from_translation(DVec3::Z))]).unwrap();
         for motion in [None, Some(lift)] {
             let lifted = if motion.is_some() { 1.0 } else { 0.0 };
             let geometry = match motion {

@@ -61,7 +61,8 @@ pub struct LocalSurface {
 
 impl LocalSurface {
     /// All zero; as a constant, for [`Default::default`] is a call.
-    pub const ZERO: Self = Self { p: DVec3::ZERO, n: DVec3::ZERO, dp_du: DVec3::ZERO, dp_dv: DVec3::ZERO, uv: [0.0; 2], pdf_area: 0.0 };
+    pub const ZERO: Self =
+        Self { p: DVec3::ZERO, n: DVec3::ZERO, dp_du: DVec3::ZERO, dp_dv: DVec3::ZERO, uv: [0.0; 2], pdf_area: 0.0 };
 }
 
 /// A point chosen on a shape.
@@ -242,15 +243,20 @@ impl TransformedShape {
                 let center = self.transform.point(DVec3::ZERO);
                 Bounds { min: center - reach, max: center + reach }
             }
-            Analytic::Disk(disk) if disk.is_full_turn() => circle_bounds(map, DVec3::ZERO, [DVec3::X, DVec3::Y].map(|v| v * disk.radius())),
+            Analytic::Disk(disk) if disk.is_full_turn() => {
+                circle_bounds(map, DVec3::ZERO, [DVec3::X, DVec3::Y].map(|v| v * disk.radius()))
+            }
             Analytic::Frustum(frustum) if frustum.is_full_turn() => {
                 let [bottom, top] = frustum.radii().map(|r| [DVec3::X * r, DVec3::Y * r]);
-                let (a, b) = (circle_bounds(map, DVec3::ZERO, bottom), circle_bounds(map, DVec3::Z * frustum.height(), top));
+                let (a, b) =
+                    (circle_bounds(map, DVec3::ZERO, bottom), circle_bounds(map, DVec3::Z * frustum.height(), top));
                 Bounds { min: a.min.min(b.min), max: a.max.max(b.max) }
             }
             Analytic::Revolution(revolution) if revolution.is_full_turn() => {
-                let rims = revolution.rims().map(|[r, y]| circle_bounds(map, DVec3::Y * y, [DVec3::Z * r, DVec3::X * r]));
-                let hull = rims.fold(Bounds::EMPTY, |all, b| Bounds { min: all.min.min(b.min), max: all.max.max(b.max) });
+                let rims =
+                    revolution.rims().map(|[r, y]| circle_bounds(map, DVec3::Y * y, [DVec3::Z * r, DVec3::X * r]));
+                let hull =
+                    rims.fold(Bounds::EMPTY, |all, b| Bounds { min: all.min.min(b.min), max: all.max.max(b.max) });
                 Bounds { min: hull.min.max(boxed.min), max: hull.max.min(boxed.max) }
             }
             _ => boxed,
@@ -269,7 +275,14 @@ impl TransformedShape {
     }
 
     /// The points of the [interactions](Self::interaction) for hits of the first `count` rays at the distances `t`.
-    pub fn resolve_rows(&self, rays: &RayRows, t: &[f32; BATCH], count: usize, points: &mut WorldPointRows, normals: &mut WorldNormalRows) {
+    pub fn resolve_rows(
+        &self,
+        rays: &RayRows,
+        t: &[f32; BATCH],
+        count: usize,
+        points: &mut WorldPointRows,
+        normals: &mut WorldNormalRows,
+    ) {
         points::resolve(self, rays, t, count, points, normals);
     }
 
@@ -281,7 +294,12 @@ impl TransformedShape {
 
     /// The interaction with the change of the point with v.
     #[inline(always)]
-    pub(super) fn interaction_and_dp_dv(&self, detail: Detail, ray: &Ray, hit: &Hit) -> Option<(SurfaceInteraction, Vec3)> {
+    pub(super) fn interaction_and_dp_dv(
+        &self,
+        detail: Detail,
+        ray: &Ray,
+        hit: &Hit,
+    ) -> Option<(SurfaceInteraction, Vec3)> {
         let centered = self.centered_ray(&Ray { t_max: f32::INFINITY, ..*ray });
         let local_hit = self.hit_near(hit.t, &centered)?;
         let t = local_hit.t + centered.shift;

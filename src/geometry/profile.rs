@@ -36,8 +36,9 @@ impl Profile {
         check_finite(points)?;
         let point = |i: usize| DVec2::from(points[i]);
         // The joint at the control point i; both neighbours use the same number.
-        let joints: Vec<DVec2> =
-            (1..points.len() - 1).map(|i| blend(&[point(i - 1), point(i), point(i + 1)], [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0])).collect();
+        let joints: Vec<DVec2> = (1..points.len() - 1)
+            .map(|i| blend(&[point(i - 1), point(i), point(i + 1)], [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0]))
+            .collect();
         let segments = joints
             .windows(2)
             .enumerate()

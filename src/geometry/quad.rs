@@ -142,7 +142,12 @@ mod tests {
     fn uv_are_coordinates_along_the_edges() {
         let quad = Quad::new(dvec3(1.0, 2.0, 3.0), dvec3(2.0, 0.0, 0.0), dvec3(1.0, 3.0, 0.0)).unwrap();
         let target = dvec3(1.0, 2.0, 3.0) + quad.edge_u() * 0.25 + quad.edge_v() * 0.75;
-        let ray = RayF64 { origin: target + dvec3(1.0, -2.0, 4.0), direction: dvec3(-0.5, 1.0, -2.0), t_min: 0.0, t_max: f64::INFINITY };
+        let ray = RayF64 {
+            origin: target + dvec3(1.0, -2.0, 4.0),
+            direction: dvec3(-0.5, 1.0, -2.0),
+            t_min: 0.0,
+            t_max: f64::INFINITY,
+        };
         let hit = LocalHit { t: quad.distance(&ray), profile: 0.0 };
         let s = quad.surface(Detail::Full, &ray, &hit);
         assert!((hit.t - 2.0).abs() < 1e-14 && (s.uv[0] - 0.25).abs() < 1e-14 && (s.uv[1] - 0.75).abs() < 1e-14);

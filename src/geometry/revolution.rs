@@ -48,7 +48,8 @@ impl Revolution {
     pub fn new(profile: &Profile, phi_max: f64) -> Result<Self, ShapeError> {
         let sector = Sector::new(phi_max)?;
         let points = || profile.segments().iter().flatten();
-        let (low, high) = points().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p.y), high.max(p.y)));
+        let (low, high) =
+            points().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p.y), high.max(p.y)));
         let middle = 0.5 * low + 0.5 * high;
         let size = points().fold(0.5 * (high - low), |size, p| size.max(p.x.abs()));
         let segments: Vec<Segment> =
@@ -84,7 +85,9 @@ impl Revolution {
     /// Circles about the y axis, as radius and height, whose hull holds the whole surface.
     pub fn rims(&self) -> impl Iterator<Item = [f64; 2]> {
         let slack = 4.0 * f64::EPSILON * self.size;
-        let rims = move |s: &Segment| [s.z_range.min - slack, s.z_range.max + slack].map(|z| [s.r_range.max + slack, z + self.middle]);
+        let rims = move |s: &Segment| {
+            [s.z_range.min - slack, s.z_range.max + slack].map(|z| [s.r_range.max + slack, z + self.middle])
+        };
         self.segments.iter().flat_map(rims)
     }
 

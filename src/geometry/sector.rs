@@ -141,7 +141,11 @@ mod tests {
                     }
                 }
             }
-            assert!((bounds.min - seen.min).abs().max_element() < 1e-3 && (bounds.max - seen.max).abs().max_element() < 1e-3, "{phi_max}");
+            assert!(
+                (bounds.min - seen.min).abs().max_element() < 1e-3
+                    && (bounds.max - seen.max).abs().max_element() < 1e-3,
+                "{phi_max}"
+            );
             assert!(bounds.min.cmple(seen.min).all() && bounds.max.cmpge(seen.max).all(), "{phi_max}");
         }
     }

@@ -64,7 +64,8 @@ pub(super) fn corner_tangents(
     uvs: &[[f32; 2]],
     triangles: &[[u32; 3]],
 ) -> Option<Vec<CornerTangents>> {
-    let mut source = TangentSpaceInput { positions, normals, uvs, triangles, tangents: vec![[[0.0; 4]; 3]; triangles.len()] };
+    let mut source =
+        TangentSpaceInput { positions, normals, uvs, triangles, tangents: vec![[[0.0; 4]; 3]; triangles.len()] };
     bevy_mikktspace::generate_tangents(&mut source).ok()?;
     Some(source.tangents)
 }
@@ -90,7 +91,9 @@ impl Mesh {
     #[must_use]
     pub fn with_tangents(mut self) -> Self {
         let Some(uvs) = &self.uvs else { return self };
-        let at = |positions: &[[f32; 3]], normals: Option<&[[f32; 3]]>| corner_tangents(positions, normals, uvs, &self.triangles);
+        let at = |positions: &[[f32; 3]], normals: Option<&[[f32; 3]]>| {
+            corner_tangents(positions, normals, uvs, &self.triangles)
+        };
         let first = at(self.positions(), self.normals.as_deref());
         let later = self.later.iter().map(|step| at(&step.positions, step.normals.as_deref()));
         self.tangents = std::iter::once(first).chain(later).collect::<Option<Vec<_>>>().unwrap_or_default();

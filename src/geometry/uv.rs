@@ -59,7 +59,8 @@ mod tests {
         let wide = DAffine3::from_mat3(DMat3::from_diagonal(DVec3::new(1.0, 4.0, 7.0)));
         assert_eq!(density(triangle(), Some(wide)), 2.0);
         // Without uv, barycentric coordinates.
-        let bare = Mesh::new(vec![[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]], vec![[0, 1, 2]], None, None).unwrap();
+        let bare =
+            Mesh::new(vec![[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]], vec![[0, 1, 2]], None, None).unwrap();
         assert_eq!(density(bare, None), 0.25);
     }
 }

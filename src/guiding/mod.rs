@@ -192,7 +192,9 @@ impl Guide {
             return;
         }
         let amount = (light * self.scale).min(LARGEST * UNITS);
-        if let Some([surface, guide]) = densities.filter(|[surface, guide]| (surface + guide).is_finite() && surface + guide > 0.0) {
+        if let Some([surface, guide]) =
+            densities.filter(|[surface, guide]| (surface + guide).is_finite() && surface + guide > 0.0)
+        {
             let usual = BSDF_SAMPLING_FRACTION * surface + (1.0 - BSDF_SAMPLING_FRACTION) * guide;
             for (sum, share) in self.leaves[leaf].gains.iter().zip(OTHER_FRACTIONS) {
                 let gain = ((share * surface + (1.0 - share) * guide) / usual).ln();
@@ -223,14 +225,18 @@ impl Guide {
         let mut plans = Vec::new();
         for (index, leaf) in self.nodes.iter().enumerate().filter_map(|(index, node)| Some((index, node.leaf()?))) {
             let leaf = &self.leaves[leaf];
-            plans.push((leaf, next.divide(index, depths[index], leaf.count.load(Ordering::Relaxed), most_records, &mut free)));
+            plans.push((
+                leaf,
+                next.divide(index, depths[index], leaf.count.load(Ordering::Relaxed), most_records, &mut free),
+            ));
         }
         let leaves: usize = plans.iter().map(|(_, parts)| parts.len()).sum();
         let most_nodes = (MAX_NODES / leaves.max(1)).min(MAX_NODES_OF_LEAF);
         for (leaf, parts) in plans {
             let directions = leaf.records.directions().map(Arc::new);
             let records = leaf.records.refined(most_nodes, parts.len());
-            let (count, bsdf_sampling_fraction) = (leaf.count.load(Ordering::Relaxed) / parts.len() as u64, leaf.best_share());
+            let (count, bsdf_sampling_fraction) =
+                (leaf.count.load(Ordering::Relaxed) / parts.len() as u64, leaf.best_share());
             for &part in &parts {
                 next.nodes[part] = Node(next.leaves.len() as u32 | IS_LEAF);
                 next.learned.push(Region { directions: directions.clone(), bsdf_sampling_fraction });
@@ -238,7 +244,8 @@ impl Guide {
                     records: records.copied(),
                     count: AtomicU64::new(count),
                     // What was better before need not be it for what is known now.
-                    gains: [0, 1, 2, 3].map(|k| AtomicI64::new(leaf.gains[k].load(Ordering::Relaxed) / (2 * parts.len() as i64))),
+                    gains: [0, 1, 2, 3]
+                        .map(|k| AtomicI64::new(leaf.gains[k].load(Ordering::Relaxed) / (2 * parts.len() as i64))),
                 });
             }
         }

@@ -156,8 +156,9 @@ impl DTree {
         let (words, rest) = words.as_chunks();
         let node = |&[a, b, c, d, e, f, g, h]: &[u16; 8]| Node { shares: [a, b, c, d], children: [e, f, g, h] };
         let nodes: Vec<Node> = words.iter().map(node).collect();
-        let is_tree =
-            rest.is_empty() && (1..=max_nodes).contains(&nodes.len()) && is_forest(nodes.iter().map(|node| node.children.map(u32::from)));
+        let is_tree = rest.is_empty()
+            && (1..=max_nodes).contains(&nodes.len())
+            && is_forest(nodes.iter().map(|node| node.children.map(u32::from)));
         let has_light = |index: usize| nodes[index].shares != [0; 4];
         let enters_light = |node: &Node| {
             let mut quarters = node.shares.iter().zip(node.children).filter(|(_, child)| u32::from(*child) != LEAF);
@@ -257,7 +258,10 @@ impl DTreeBuilder {
                 let child = self.nodes[index].children[k];
                 if child != LEAF {
                     let below = sums[child as usize];
-                    sums[index][k] = NodeSums { light: below.iter().map(|h| h.light).sum(), count: below.iter().map(|h| h.count).sum() };
+                    sums[index][k] = NodeSums {
+                        light: below.iter().map(|h| h.light).sum(),
+                        count: below.iter().map(|h| h.count).sum(),
+                    };
                 }
             }
         }
@@ -289,7 +293,10 @@ impl DTreeBuilder {
         while index < nodes.len() {
             let (old, quarters, depth) = sources[index];
             for (k, &quarter) in quarters.iter().enumerate() {
-                let divided = quarter.light > threshold && quarter.count >= RECORDS_TO_DIVIDE && depth < MAX_DEPTH && nodes.len() < most;
+                let divided = quarter.light > threshold
+                    && quarter.count >= RECORDS_TO_DIVIDE
+                    && depth < MAX_DEPTH
+                    && nodes.len() < most;
                 if !divided {
                     nodes[index].sums[k] = AtomicU64::new((share * quarter.light) as u64);
                     nodes[index].counts[k] = AtomicU32::new((share * quarter.count) as u32);
@@ -328,7 +335,9 @@ impl DTreeBuilder {
             children: [12, 13, 14, 15].map(|k| words[k]),
         };
         let nodes: Vec<RecordNode> = words.iter().map(node).collect();
-        let is_tree = rest.is_empty() && (1..=max_nodes).contains(&nodes.len()) && is_forest(nodes.iter().map(|node| node.children));
+        let is_tree = rest.is_empty()
+            && (1..=max_nodes).contains(&nodes.len())
+            && is_forest(nodes.iter().map(|node| node.children));
         is_tree.then_some(Self { nodes })
     }
 

@@ -63,7 +63,8 @@ impl Guide {
             guide.learned.push(learned);
             let records = DTreeBuilder::read(data, MAX_NODES_OF_LEAF)?;
             let count = AtomicU64::new(data.long()?);
-            let gains = [data.long()?, data.long()?, data.long()?, data.long()?].map(|gain| AtomicI64::new(gain as i64));
+            let gains =
+                [data.long()?, data.long()?, data.long()?, data.long()?].map(|gain| AtomicI64::new(gain as i64));
             guide.leaves.push(Leaf { records, count, gains });
         }
         Some(guide)

@@ -134,10 +134,17 @@ fn no_record_can_poison_the_guide() {
         assert!((0.0..=1.0).contains(&bsdf_sampling_fraction));
     }
     for x in bad {
-        assert!(guide.at(Vec3::splat(x), Vec3::new(x, 0.0, 0.0)).is_none_or(|known| known.directions.pdf(Vec3::Z).is_finite()));
+        assert!(
+            guide
+                .at(Vec3::splat(x), Vec3::new(x, 0.0, 0.0))
+                .is_none_or(|known| known.directions.pdf(Vec3::Z).is_finite())
+        );
     }
     // Neither can boxes that are none.
-    for bounds in [Aabb { min: Vec3::splat(f32::INFINITY), max: Vec3::splat(f32::NEG_INFINITY) }, Aabb { min: Vec3::ONE, max: Vec3::ONE }] {
+    for bounds in [
+        Aabb { min: Vec3::splat(f32::INFINITY), max: Vec3::splat(f32::NEG_INFINITY) },
+        Aabb { min: Vec3::ONE, max: Vec3::ONE },
+    ] {
         let guide = Guide::new(bounds, 1.0);
         guide.record(&record(Vec3::ONE, Vec3::X, 1.0));
         assert!(guide.refined(1).at(Vec3::ZERO, Vec3::Z).unwrap().directions.pdf(Vec3::X) > 0.0);

@@ -55,7 +55,10 @@ pub fn blank_comments(text: &str) -> Blanked {
         i += 1;
     }
     // Only whole comments were replaced, by ASCII, so this is still UTF-8.
-    Blanked { text: String::from_utf8(out).unwrap_or_default(), open_comment: (state == State::Block).then_some(comment_start) }
+    Blanked {
+        text: String::from_utf8(out).unwrap_or_default(),
+        open_comment: (state == State::Block).then_some(comment_start),
+    }
 }
 
 #[derive(Clone, Copy, PartialEq)]

@@ -67,7 +67,8 @@ pub fn refine(scene: &Value, steps: &mut Vec<Step>) -> Option<String> {
     if let (Value::Object(root), Some(Step::Key(_))) = (&mut trial, steps.first()) {
         root.entry("camera").or_insert_with(|| Value::Object(serde_json::Map::new()));
     }
-    let mut at: Vec<Step> = steps.iter().map(|step| if let Step::Index(_) = step { Step::Index(0) } else { step.clone() }).collect();
+    let mut at: Vec<Step> =
+        steps.iter().map(|step| if let Step::Index(_) = step { Step::Index(0) } else { step.clone() }).collect();
 
     let message = fault(&trial)?;
     while let Some(step) = culprit(&mut trial, &at, &message) {
@@ -89,7 +90,8 @@ fn culprit(scene: &mut Value, at: &[Step], message: &str) -> Option<Step> {
             // question.
             let is_type = |key: &str| key == "type";
             let mut keys: Vec<String> = map.keys().filter(|key| !is_type(key)).cloned().collect();
-            let type_is_wrong = map.get("type").is_some_and(|t| t.as_str().is_none_or(|t| message.contains(&format!("variant `{t}`"))));
+            let type_is_wrong =
+                map.get("type").is_some_and(|t| t.as_str().is_none_or(|t| message.contains(&format!("variant `{t}`"))));
             keys.extend(type_is_wrong.then(|| "type".to_owned()));
             keys.into_iter().map(Step::Key).find(|step| {
                 let Step::Key(key) = step else { return false };
@@ -102,7 +104,11 @@ fn culprit(scene: &mut Value, at: &[Step], message: &str) -> Option<Step> {
                 changes
             })
         }
-        Value::Array(list) if ["invalid type", "invalid value", "unknown", "missing"].iter().any(|start| message.starts_with(start)) => {
+        Value::Array(list)
+            if ["invalid type", "invalid value", "unknown", "missing"]
+                .iter()
+                .any(|start| message.starts_with(start)) =>
+        {
             // The shortest beginning of the list that has the fault ends with its cause; it is not the empty one.
             let (mut low, mut high) = (0, list.len());
             while low < high {
@@ -258,6 +264,9 @@ mod tests {
 
     #[test]
     fn paths_read_as_in_code() {
-        assert_eq!(path_text(&[Step::Key("shapes".into()), Step::Index(3), Step::Key("radius".into())]), "shapes[3].radius");
+        assert_eq!(
+            path_text(&[Step::Key("shapes".into()), Step::Index(3), Step::Key("radius".into())]),
+            "shapes[3].radius"
+        );
     }
 }

@@ -100,7 +100,8 @@ fn description_hash(mut desc: SceneDesc) -> Result<String> {
     desc.sampler = SamplerDesc::default();
     desc.integrator = IntegratorDesc::default();
     desc.outputs = Vec::new();
-    let text = serde_json::to_string(&desc).map_err(|e| Error::Internal(format!("the scene cannot be written as JSON: {e}")))?;
+    let text = serde_json::to_string(&desc)
+        .map_err(|e| Error::Internal(format!("the scene cannot be written as JSON: {e}")))?;
     let mut hash = Hash::default();
     hash.text(&text);
     Ok(hash.finish())
@@ -120,8 +121,8 @@ mod tests {
         scene_fingerprint(&read_scene(&path, &ImportOptions::default()).unwrap(), &path).unwrap()
     }
 
-    const SCENE: &str =
-        r#"{ "camera": {}, "sampler": { "spp": 4 }, "shapes": [{ "type": "mesh", "file": "m/a.obj" }, { "type": "sphere" }] }"#;
+    const SCENE: &str = r#"{ "camera": {}, "sampler": { "spp": 4 }, "shapes": [{ "type": "mesh", "file": "m/a.obj" },
+        { "type": "sphere" }] }"#;
 
     #[test]
     fn what_a_scene_shows_counts_and_nothing_else() {
@@ -153,14 +154,21 @@ mod tests {
         std::fs::remove_file(folder.path().join("m/a.obj")).unwrap();
         let imported = read_scene(&folder.path().join("scene.json"), &ImportOptions::default()).unwrap();
         let error = scene_fingerprint(&imported, &folder.path().join("scene.json")).unwrap_err();
-        assert!(matches!(&error, Error::Missing { file, message } if file.ends_with("m/a.obj") && message.contains("shapes[0].file")));
+        assert!(matches!(
+            &error,
+            Error::Missing { file, message } if file.ends_with("m/a.obj") && message.contains("shapes[0].file")
+        ));
     }
 
     #[test]
     fn assets_without_files_count() {
         let hash = |change: &dyn Fn(&mut MeshData)| {
             let mut imported = Draft::default().finish();
-            let mut mesh = MeshData { positions: vec![[0.0; 3], [1.0, 2.0, 3.0]], triangles: vec![[0, 1, 1]], ..MeshData::default() };
+            let mut mesh = MeshData {
+                positions: vec![[0.0; 3], [1.0, 2.0, 3.0]],
+                triangles: vec![[0, 1, 1]],
+                ..MeshData::default()
+            };
             change(&mut mesh);
             std::sync::Arc::make_mut(&mut imported.assets).meshes.insert("a.ply".into(), mesh);
             let shape = serde_json::from_str(r#"{ "type": "mesh", "file": "a.ply" }"#).unwrap();
@@ -171,9 +179,12 @@ mod tests {
         assert_eq!(hash(&|_| {}), same);
         assert_ne!(hash(&|mesh| mesh.positions[1][2] = 3.5), same);
         assert_ne!(hash(&|mesh| mesh.normals = Some(vec![])), same);
-        let attribute = |name: &str, values: &AttributeValues| hash(&|mesh| drop(mesh.attributes.insert(name.into(), values.clone())));
+        let attribute = |name: &str, values: &AttributeValues| {
+            hash(&|mesh| drop(mesh.attributes.insert(name.into(), values.clone())))
+        };
         let (number, color) = (AttributeValues::Numbers(vec![0.5; 3]), AttributeValues::Colors(vec![[0.5; 3]]));
-        let hashes = [attribute("vertex_a", &number), attribute("vertex_a", &color), attribute("vertex_b", &number), same];
+        let hashes =
+            [attribute("vertex_a", &number), attribute("vertex_a", &color), attribute("vertex_b", &number), same];
         assert!((0..4).all(|i| !hashes[..i].contains(&hashes[i])));
     }
 }

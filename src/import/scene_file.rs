@@ -16,7 +16,8 @@ use crate::suggestion::did_you_mean;
 /// # Errors
 /// [`Error::Missing`] if it cannot be read, [`Error::Parse`] with line, column and path for faults in it.
 pub fn load_scene(path: &Path) -> Result<SceneDesc> {
-    let bytes = crate::file::read_stream(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
+    let bytes =
+        crate::file::read_stream(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
     match std::str::from_utf8(&bytes) {
         Ok(text) => parse_scene(text, path),
         Err(e) => {
@@ -37,7 +38,12 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneDesc> {
         return Err(fault_at(path, text, start, "the comment is never closed".into()));
     }
     if json.trim().is_empty() {
-        return Err(fault_at(path, text, 0, "the file is empty: a scene is a JSON object with at least a `camera`".into()));
+        return Err(fault_at(
+            path,
+            text,
+            0,
+            "the file is empty: a scene is a JSON object with at least a `camera`".into(),
+        ));
     }
     let mut deserializer = serde_json::Deserializer::from_str(json);
     let parsed = serde_path_to_error::deserialize::<_, SceneDesc>(&mut deserializer);
@@ -75,7 +81,9 @@ fn parse_fault(path: &Path, text: &str, json: &str, error: &serde_path_to_error:
     };
     // Where the message itself names the last key, the place is the key's.
     let names_key = match steps.last() {
-        Some(Step::Key(key)) => ["field", "variant"].iter().any(|what| message.starts_with(&format!("unknown {what} `{key}`"))),
+        Some(Step::Key(key)) => {
+            ["field", "variant"].iter().any(|what| message.starts_with(&format!("unknown {what} `{key}`")))
+        }
         _ => false,
     };
     let start = fault::locate(json, &steps, names_key).unwrap_or_else(|| offset(text, inner));
@@ -136,12 +144,18 @@ mod tests {
     fn a_typo_has_its_place_and_a_suggestion() {
         let text = "{\n \"camera\": {},\n \"shapes\": [{ \"type\": \"sphere\", \"radus\": 2 }]\n}";
         assert_message(text, "s.json:3:33: shapes[0]: ", &["`radus`", "did you mean `radius`"]);
-        assert_message("{ \"camera\": {}, \"shaeps\": [] }", "s.json:1:17: unknown field `shaeps`", &["did you mean `shapes`"]);
+        assert_message(
+            "{ \"camera\": {}, \"shaeps\": [] }",
+            "s.json:1:17: unknown field `shaeps`",
+            &["did you mean `shapes`"],
+        );
     }
 
     #[test]
     fn faults_inside_typed_values_have_their_own_path() {
-        let shape = |body: &str| format!("{{ \"camera\": {{}}, // é\n \"shapes\": [{{ \"type\": \"cube\" }},\n {{ {body} }}] }}");
+        let shape = |body: &str| {
+            format!("{{ \"camera\": {{}}, // é\n \"shapes\": [{{ \"type\": \"cube\" }},\n {{ {body} }}] }}")
+        };
         let text = shape("\"type\": \"sphere\", \"z_max\": \"high\"");
         assert_message(&text, "s.json:3:31: shapes[1].z_max: invalid type: string \"high\"", &[]);
         let text = shape("\"emission\": { \"radiance\": [1, true, 1] }, \"type\": \"disk\"");
@@ -150,7 +164,8 @@ mod tests {
         assert_message(&text, "s.json:3:32: shapes[1].emission: missing field `radiance`", &[]);
         let text = shape("\"type\": \"cube\", \"transform\": [{ \"scale\": 2 }, { \"trnslate\": [1, 2, 3] }]");
         assert_message(&text, "s.json:3:", &["shapes[1].transform[1]", "did you mean `translate`"]);
-        let text = "{ \"camera\": {}, \"objects\": { \"o\": { \"shapes\": [{ \"type\": \"quad\", \"origin\": [1, 2] }] } } }";
+        let text =
+            "{ \"camera\": {}, \"objects\": { \"o\": { \"shapes\": [{ \"type\": \"quad\", \"origin\": [1, 2] }] } } }";
         assert_message(text, "s.json:1:", &["objects.o.shapes[0].origin: invalid length 2"]);
     }
 
@@ -158,18 +173,30 @@ mod tests {
     fn unknown_types_are_named() {
         let text = "{ \"camera\": {}, \"shapes\": [{ \"type\": \"shpere\" }] }";
         assert_message(text, "s.json:1:38: shapes[0].type: unknown variant `shpere`", &["did you mean `sphere`"]);
-        assert_message("{ \"camera\": {}, \"shapes\": [{ \"radius\": 1 }] }", "s.json:1:28: shapes[0]: missing field `type`", &[]);
+        assert_message(
+            "{ \"camera\": {}, \"shapes\": [{ \"radius\": 1 }] }",
+            "s.json:1:28: shapes[0]: missing field `type`",
+            &[],
+        );
     }
 
     #[test]
     fn integrators_without_parameters_take_none() {
-        assert_message("{ \"camera\": {}, \"integrator\": { \"type\": \"normal\", \"max_depth\": 3 } }", "s.json:1:", &["max_depth"]);
-        assert!(parse_scene("{ \"camera\": {}, \"integrator\": { \"type\": \"shading_normal\" } }", Path::new("s.json")).is_ok());
+        assert_message(
+            "{ \"camera\": {}, \"integrator\": { \"type\": \"normal\", \"max_depth\": 3 } }",
+            "s.json:1:",
+            &["max_depth"],
+        );
+        assert!(
+            parse_scene("{ \"camera\": {}, \"integrator\": { \"type\": \"shading_normal\" } }", Path::new("s.json"))
+                .is_ok()
+        );
     }
 
     #[test]
     fn names_and_keys_are_given_once() {
-        let text = "{ \"camera\": {}, \"materials\": { \"a\": { \"type\": \"mirror\" }, \"a\": { \"type\": \"diffuse\" } } }";
+        let text =
+            "{ \"camera\": {}, \"materials\": { \"a\": { \"type\": \"mirror\" }, \"a\": { \"type\": \"diffuse\" } } }";
         assert_message(text, "s.json:1:", &["\"a\" is given twice"]);
         assert_message("{ \"camera\": {}, \"camera\": {} }", "s.json:1:", &["duplicate field `camera`"]);
         assert_message(
@@ -187,10 +214,13 @@ mod tests {
 
     #[test]
     fn truncated_empty_and_trailing_texts_are_errors() {
-        for text in ["", " \n", "// nothing", "{", "{ \"camera\": {}", "[1, 2", "{ \"camera\": {} } x", "nul", "/* open"] {
+        for text in
+            ["", " \n", "// nothing", "{", "{ \"camera\": {}", "[1, 2", "{ \"camera\": {} } x", "nul", "/* open"]
+        {
             assert!(message(text).starts_with("s.json:1:"), "{text}");
         }
-        let whole = "{ \"camera\": { \"position\": [0, 1, 2] }, \"shapes\": [{ \"type\": \"sphere\", \"name\": \"a\\u00e9\" }] }";
+        let whole = "{ \"camera\": { \"position\": [0, 1, 2] }, \"shapes\": [{ \"type\": \"sphere\", \"name\": \
+                     \"a\\u00e9\" }] }";
         assert!(parse_scene(whole, Path::new("s.json")).is_ok());
         for end in 0..whole.len() {
             assert!(parse_scene(&whole[..end], Path::new("s.json")).is_err(), "{end}");
@@ -200,7 +230,9 @@ mod tests {
 
     #[test]
     fn deep_nesting_is_an_error() {
-        for deep in ["[".repeat(100_000), "{\"camera\":".repeat(100_000), format!("{{ \"camera\": {} }}", "[".repeat(100_000))] {
+        for deep in
+            ["[".repeat(100_000), "{\"camera\":".repeat(100_000), format!("{{ \"camera\": {} }}", "[".repeat(100_000))]
+        {
             assert_message(&deep, "s.json:1:", &[]);
         }
     }

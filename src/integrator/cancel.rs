@@ -85,7 +85,8 @@ mod tests {
     #[test]
     fn batches_are_given_up_a_while_after_the_signal_and_for_good() {
         let stop = AtomicBool::new(false);
-        let cancel = Cancel { start: Instant::now().checked_sub(Duration::from_secs(60)).unwrap(), ..Cancel::new(&stop, None) };
+        let cancel =
+            Cancel { start: Instant::now().checked_sub(Duration::from_secs(60)).unwrap(), ..Cancel::new(&stop, None) };
         assert!(!cancel.is_due());
         stop.store(true, Ordering::Relaxed);
         assert!(!cancel.is_due());

@@ -16,7 +16,13 @@ use crate::texture::Footprint;
 impl World<'_> {
     /// The footprint in uv of `ray`, whose hit led to `at`.
     #[inline(never)]
-    pub(super) fn footprint(&self, cone: Option<&RayCone>, ray: &Ray, hit: Option<&Hit>, at: &SurfaceInteraction) -> Footprint<'_> {
+    pub(super) fn footprint(
+        &self,
+        cone: Option<&RayCone>,
+        ray: &Ray,
+        hit: Option<&Hit>,
+        at: &SurfaceInteraction,
+    ) -> Footprint<'_> {
         // By a rounding artefact, the ray meets another surface than that of the hit.
         let hit = hit.filter(|hit| (hit.instance, hit.shape, hit.prim) == at.ids());
         let (Some(cone), Some(hit)) = (cone, hit) else { return self.scene.texture_point(at) };
@@ -26,8 +32,15 @@ impl World<'_> {
     /// The footprint in uv of a ray in `direction` at a point of this
     /// [density of uv](crate::geometry::Geometry::uv_density).
     #[inline]
-    pub(super) fn covered(&self, cone: &RayCone, direction: Vec3, at: &SurfaceInteraction, uv_density: f32) -> Footprint<'_> {
-        self.scene.with_attributes(at, Footprint::of_cone(at.uv, cone.width_at(at.t), direction.dot(at.n_g), uv_density))
+    pub(super) fn covered(
+        &self,
+        cone: &RayCone,
+        direction: Vec3,
+        at: &SurfaceInteraction,
+        uv_density: f32,
+    ) -> Footprint<'_> {
+        self.scene
+            .with_attributes(at, Footprint::of_cone(at.uv, cone.width_at(at.t), direction.dot(at.n_g), uv_density))
     }
 }
 

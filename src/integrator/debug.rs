@@ -133,8 +133,9 @@ fn for_each_first_surface(
         out.pixels[i] = PixelSample { radiance, alpha: 1.0 };
         add_emission(&mut out.light_aovs, i, radiance);
         if needs_surface {
-            out.surfaces[i] =
-                surface_sample(pass, needs, FirstSurface { ray, hit: hit.as_ref(), at: &at }, || world.scene.texture_point(&at));
+            out.surfaces[i] = surface_sample(pass, needs, FirstSurface { ray, hit: hit.as_ref(), at: &at }, || {
+                world.scene.texture_point(&at)
+            });
         }
     }
 }

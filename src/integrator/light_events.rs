@@ -70,8 +70,12 @@ pub(super) fn add_by_scattering(light_aovs: &mut LightAovRows, sample: usize, li
     let (lobes, [diffuse, specular, transmission]) = match event {
         LightEvent::Emission => return add(LightAov::Emission, light),
         LightEvent::Environment => return add(LightAov::Background, light),
-        LightEvent::Direct(lobes) => (lobes, [LightAov::DiffuseDirect, LightAov::SpecularDirect, LightAov::TransmissionDirect]),
-        LightEvent::Indirect(lobes) => (lobes, [LightAov::DiffuseIndirect, LightAov::SpecularIndirect, LightAov::TransmissionIndirect]),
+        LightEvent::Direct(lobes) => {
+            (lobes, [LightAov::DiffuseDirect, LightAov::SpecularDirect, LightAov::TransmissionDirect])
+        }
+        LightEvent::Indirect(lobes) => {
+            (lobes, [LightAov::DiffuseIndirect, LightAov::SpecularIndirect, LightAov::TransmissionIndirect])
+        }
     };
     match lobes {
         LobeWeights::Transmitted => add(transmission, light),

@@ -87,7 +87,13 @@ impl World<'_> {
 
     /// The media beyond a surface, if a path that came along `from` crosses it by going on along `to`; else those it is
     /// in.
-    pub(super) fn media_toward(&self, at: &SurfaceInteraction, from: Vec3, to: Vec3, current: &MediumStack) -> MediumStack {
+    pub(super) fn media_toward(
+        &self,
+        at: &SurfaceInteraction,
+        from: Vec3,
+        to: Vec3,
+        current: &MediumStack,
+    ) -> MediumStack {
         match self.scene.surface(at.shape).medium {
             Some(medium) if crosses(at, from, to) => {
                 let is_front = from.dot(at.n_g) < 0.0;
@@ -112,7 +118,9 @@ impl World<'_> {
             transmittance *= self.scene.media.transmittance(&state.current, distance);
             let boundary = at.as_ref().and_then(|at| self.boundary(at, ray.direction, state));
             let ior = boundary.as_ref().map(|boundary| boundary.ior);
-            let (Some(at), Some(boundary), true) = (at, boundary, ior.is_some_and(|ior| ior.is_one()) && passed < MAX_SURFACES) else {
+            let (Some(at), Some(boundary), true) =
+                (at, boundary, ior.is_some_and(|ior| ior.is_one()) && passed < MAX_SURFACES)
+            else {
                 return Arrival { hit, transmittance, passed, ior };
             };
             state.current = boundary.sides.beyond(ray.direction.dot(at.n_g) < 0.0);
@@ -140,9 +148,8 @@ impl World<'_> {
             probe = at.spawn(PROBE);
         }
         // On the way back from infinity, where nothing contains anything.
-        crossings.iter().rev().fold(
-            MediumStack::default(),
-            |current, &(medium, entering)| if entering { current.popped(medium) } else { current.pushed(medium) },
-        )
+        crossings.iter().rev().fold(MediumStack::default(), |current, &(medium, entering)| {
+            if entering { current.popped(medium) } else { current.pushed(medium) }
+        })
     }
 }

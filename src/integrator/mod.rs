@@ -211,17 +211,19 @@ pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
     let Setup { sampler, needs, light_aovs } = setup;
     let view = |view| Box::new(DebugView { view, needs, light_aovs }) as Box<dyn Integrator>;
     match *desc {
-        IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp, regularize, hide_emitters, .. } => Box::new(PathIntegrator {
-            max_depth,
-            rr_depth,
-            strategy: strategy.into(),
-            clamp: clamp.unwrap_or(f32::INFINITY),
-            regularization: regularize.map(|alpha| Regularization { alpha }),
-            hide_emitters,
-            sampler,
-            needs,
-            light_aovs,
-        }),
+        IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp, regularize, hide_emitters, .. } => {
+            Box::new(PathIntegrator {
+                max_depth,
+                rr_depth,
+                strategy: strategy.into(),
+                clamp: clamp.unwrap_or(f32::INFINITY),
+                regularization: regularize.map(|alpha| Regularization { alpha }),
+                hide_emitters,
+                sampler,
+                needs,
+                light_aovs,
+            })
+        }
         IntegratorDesc::Whitted { max_depth, ambient, hide_emitters } => {
             Box::new(Whitted { max_depth, ambient: ambient.into(), hide_emitters, sampler, needs, light_aovs })
         }

@@ -25,7 +25,12 @@ pub struct SurfaceAovs {
 
 /// What the layers need of the place of the first surface, which `ray` meets at `at`; `hit` is what the accelerator
 /// found.
-pub(super) fn place_sample(pass: &PassContext, needs: SurfaceAovs, at: &SurfaceInteraction, hit: Option<&Hit>) -> SurfaceSample {
+pub(super) fn place_sample(
+    pass: &PassContext,
+    needs: SurfaceAovs,
+    at: &SurfaceInteraction,
+    hit: Option<&Hit>,
+) -> SurfaceSample {
     let (world, mut sample) = (pass.world, SurfaceSample::default());
     if needs.geometry {
         sample.depth = world.scene.camera.depth(at.p, at.time);
@@ -70,7 +75,12 @@ pub(super) fn surface_sample<'f>(
 }
 
 /// What a surface scatters of the light that goes back along a ray.
-pub(super) fn albedo_at<'f>(world: &World, at: &SurfaceInteraction, ray: &Ray, footprint: impl FnOnce() -> Footprint<'f>) -> Rgb {
+pub(super) fn albedo_at<'f>(
+    world: &World,
+    at: &SurfaceInteraction,
+    ray: &Ray,
+    footprint: impl FnOnce() -> Footprint<'f>,
+) -> Rgb {
     let frame = Frame::from_normal(at.n_s);
     world.scene.bsdf(at, ray.direction, footprint).albedo(frame.to_local(-ray.direction))
 }

@@ -53,14 +53,24 @@ pub(super) struct Vertex<'a> {
 impl<'a> Vertex<'a> {
     /// The vertex at `at`, where `ray` arrives with `footprint`.
     #[inline(always)]
-    pub fn new(world: &'a World, at: &'a SurfaceInteraction, ray: &Ray, footprint: impl FnOnce() -> Footprint<'a>) -> Self {
+    pub fn new(
+        world: &'a World,
+        at: &'a SurfaceInteraction,
+        ray: &Ray,
+        footprint: impl FnOnce() -> Footprint<'a>,
+    ) -> Self {
         let back = -ray.direction;
         let cos_geometric = back.dot(at.n_g);
         let n_s = if world.scene.features.shading_normals { facing_normal(back, at.n_s, at.n_g) } else { at.n_g };
-        let frame = if world.scene.features.anisotropic { Frame::from_normal_and_tangent(n_s, at.dp_du) } else { Frame::from_normal(n_s) };
+        let frame = if world.scene.features.anisotropic {
+            Frame::from_normal_and_tangent(n_s, at.dp_du)
+        } else {
+            Frame::from_normal(n_s)
+        };
         let bsdf = world.scene.bsdf(at, ray.direction, footprint);
         // On a smooth mesh the factor would show the facets, for it jumps with the geometric normal.
-        let is_perturbed = world.scene.features.normal_perturbations && world.scene.normal_perturbation(at, ray.direction).is_some();
+        let is_perturbed =
+            world.scene.features.normal_perturbations && world.scene.normal_perturbation(at, ray.direction).is_some();
         let cos_normals = (is_perturbed && n_s != at.n_g).then(|| n_s.dot(at.n_g));
         Self { at, bsdf, frame, wo: frame.to_local(back), cos_geometric, cos_normals }
     }
@@ -120,10 +130,17 @@ impl<'a> Vertex<'a> {
     /// Where a ray starts in a direction that the shading normal sees and the facet does not.
     #[inline]
     fn terminator_point(&self, world: &World, direction: Vec3) -> Option<SurfaceInteraction> {
-        let sides = HemisphereTest::new([self.wo.z, direction.dot(self.frame.z)], [self.cos_geometric, direction.dot(self.at.n_g)]);
+        let sides = HemisphereTest::new(
+            [self.wo.z, direction.dot(self.frame.z)],
+            [self.cos_geometric, direction.dot(self.at.n_g)],
+        );
         // Under a normal map, the factor has darkened what comes near. Where light passes, the side of the facet
         // decides the medium of a ray.
-        if !sides.is_below_facet() || !world.scene.features.shading_normals || self.cos_normals.is_some() || self.bsdf.flags().transmits() {
+        if !sides.is_below_facet()
+            || !world.scene.features.shading_normals
+            || self.cos_normals.is_some()
+            || self.bsdf.flags().transmits()
+        {
             return None;
         }
         let (start, way) = terminator_start(world, self.at, self.light_context().n)?;

@@ -8,6 +8,7 @@ use super::media::MediaState;
 use super::surface::{FirstSurface, surface_sample};
 use super::vertex::Vertex;
 use super::{CameraBatch, CameraSample, Integrator, PassContext, RayCounts, SurfaceAovs, Workspace, World, dimensions};
+use crate::bsdf::BsdfSample;
 use crate::color::Rgb;
 use crate::film::{LightAovRequest, LightAovRows, PixelSample, SurfaceSample};
 use crate::geometry::{Hit, SurfaceInteraction};
@@ -70,7 +71,10 @@ impl Integrator for Whitted {
             let mut tally = Tally { light_aovs: &mut out.light_aovs, index: i, rays: counts, sample, light_samples: 0 };
             let view = View { depth: 1, throughput: segment.transmittance, way: None };
             out.pixels[i] = match &segment.end {
-                Some(at) => PixelSample { radiance: self.shade(pass, &segment, at, view, &mut tally) * segment.transmittance, alpha: 1.0 },
+                Some(at) => PixelSample {
+                    radiance: self.shade(pass, &segment, at, view, &mut tally) * segment.transmittance,
+                    alpha: 1.0,
+                },
                 None if self.hide_emitters || !pass.render.shows_background => PixelSample::default(),
                 None => PixelSample {
                     radiance: segment.escaped(world, View { throughput: Rgb::WHITE, ..view }, &mut tally),
@@ -163,6 +167,17 @@ impl Segment {
         world.footprint(self.cone.as_ref(), &self.ray, self.hit.as_ref(), at)
     }
 
+    /// The surface at its end, with the scattering of the boundary between media if it is one.
+    #[inline]
+    fn vertex<'a>(&self, world: &'a World, at: &'a SurfaceInteraction) -> Vertex<'a> {
+        let boundary = world.boundary_bsdf(at, self.ray.direction, &self.media);
+        let mut vertex = Vertex::new(world, at, &self.ray, || self.footprint(world, at));
+        if let Some(boundary) = boundary {
+            vertex.bsdf = Cow::Owned(boundary);
+        }
+        vertex
+    }
+
     /// What arrives from infinity.
     fn escaped(&self, world: &World, view: View, tally: &mut Tally) -> Rgb {
         if tally.sorts() {
@@ -176,9 +191,25 @@ impl Segment {
     }
 }
 
+/// Reflection and refraction: random numbers at either end of [0, 1) choose them.
+#[inline]
+fn delta_lobes(vertex: &Vertex) -> [Option<BsdfSample>; 2] {
+    let lobe = |u: f32| vertex.bsdf.sample(vertex.wo, u, [0.5; 2]).filter(|s| s.is_delta);
+    let first = lobe(0.0);
+    let second = lobe(ONE_MINUS_EPSILON).filter(|s| Some(s.wi) != first.map(|f| f.wi));
+    [first, second]
+}
+
 impl Whitted {
     /// Radiance leaving `at`, the end of the segment, against that.
-    fn shade(&self, pass: &PassContext, segment: &Segment, at: &SurfaceInteraction, view: View, tally: &mut Tally) -> Rgb {
+    fn shade(
+        &self,
+        pass: &PassContext,
+        segment: &Segment,
+        at: &SurfaceInteraction,
+        view: View,
+        tally: &mut Tally,
+    ) -> Rgb {
         let (world, Segment { ray, cone, media, .. }) = (pass.world, segment);
         let mut radiance = world.emitted(at, -ray.direction);
         if tally.sorts() {
@@ -188,16 +219,13 @@ impl Whitted {
         if view.depth >= self.max_depth || pass.render.is_cancel_due() {
             return radiance;
         }
-        let boundary = world.boundary_bsdf(at, ray.direction, media);
-        let mut vertex = Vertex::new(world, at, ray, || segment.footprint(world, at));
-        if let Some(boundary) = boundary {
-            vertex.bsdf = Cow::Owned(boundary);
-        }
+        let vertex = segment.vertex(world, at);
         if !vertex.bsdf.flags().is_delta() {
             let ambient = self.ambient * vertex.bsdf.albedo(vertex.wo);
             radiance += ambient;
             if tally.sorts() {
-                tally.add(world, view.throughput * ambient, view.course(2, LightEvent::Indirect(LobeWeights::DIFFUSE)), None);
+                let course = view.course(2, LightEvent::Indirect(LobeWeights::DIFFUSE));
+                tally.add(world, view.throughput * ambient, course, None);
             }
             for id in (0..world.scene.lights.lights().len()).map(LightId::new) {
                 let Some((light, wi)) = self.direct_light(world, segment, &vertex, id, tally) else { continue };
@@ -209,21 +237,19 @@ impl Whitted {
             }
         }
 
-        // Both delta lobes, each without the division by its probability: u at either end of [0, 1) chooses reflection
-        // and refraction.
-        let lobe = |u: f32| vertex.bsdf.sample(vertex.wo, u, [0.5; 2]).filter(|s| s.is_delta);
-        let first = lobe(0.0);
-        let second = lobe(ONE_MINUS_EPSILON).filter(|s| Some(s.wi) != first.map(|f| f.wi));
-        for lobe in [first, second].into_iter().flatten() {
+        // Both delta lobes, each without the division by its probability.
+        for lobe in delta_lobes(&vertex).into_iter().flatten() {
             let direction = vertex.frame.to_world(lobe.wi);
             if vertex.shadowing(lobe.wi, direction) == 0.0 {
                 continue;
             }
             tally.rays.indirect += 1;
             let current = world.media_toward(at, ray.direction, direction, &media.current);
-            let next = Segment::trace(world, at.spawn(direction), cone.map(|cone| cone.moved(at.t)), current, tally.rays);
+            let next =
+                Segment::trace(world, at.spawn(direction), cone.map(|cone| cone.moved(at.t)), current, tally.rays);
             let way = view.way.unwrap_or_else(|| LobeWeights::of_sample(&vertex.bsdf, vertex.wo, &lobe));
-            let behind = View { depth: view.depth + 1, throughput: view.throughput * lobe.weight * lobe.pdf, way: Some(way) };
+            let behind =
+                View { depth: view.depth + 1, throughput: view.throughput * lobe.weight * lobe.pdf, way: Some(way) };
             let arriving = match &next.end {
                 Some(end) => {
                     let behind = View { throughput: behind.throughput * next.transmittance, ..behind };
@@ -237,7 +263,14 @@ impl Whitted {
     }
 
     /// Light that arrives from one light along a sampled direction and is scattered back, with that direction.
-    fn direct_light(&self, world: &World, segment: &Segment, vertex: &Vertex, id: LightId, tally: &mut Tally) -> Option<(Rgb, Vec3)> {
+    fn direct_light(
+        &self,
+        world: &World,
+        segment: &Segment,
+        vertex: &Vertex,
+        id: LightId,
+        tally: &mut Tally,
+    ) -> Option<(Rgb, Vec3)> {
         let set = dimensions::light(0).wrapping_add(tally.light_samples);
         tally.light_samples = tally.light_samples.wrapping_add(1);
         let [u, v, ..] = self.sampler.sample_4d(tally.sample.seed, tally.sample.sample, set);

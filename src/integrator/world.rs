@@ -57,7 +57,11 @@ impl<'a> World<'a> {
     #[inline(always)]
     pub(super) fn mesh_without_tangents(&self, shape: ShapeId) -> Option<&'a Mesh> {
         match self.scene.geometry.shape(shape) {
-            Shape::Mesh(mesh) if !mesh.is_deforming() && self.parametrization[shape.index()] != Parametrization::Full => Some(mesh),
+            Shape::Mesh(mesh)
+                if !mesh.is_deforming() && self.parametrization[shape.index()] != Parametrization::Full =>
+            {
+                Some(mesh)
+            }
             _ => None,
         }
     }
@@ -123,7 +127,10 @@ impl<'a> World<'a> {
         let scene = self.scene;
         let Some(id) = scene.normal_perturbation(&at, ray.direction) else { return at };
         let dp_dv = scene.geometry.dp_dv(ray, hit);
-        SurfaceInteraction { n_s: scene.normal_perturbations[id.index()].normal(&scene.geometry, &scene.textures, &at, dp_dv), ..at }
+        SurfaceInteraction {
+            n_s: scene.normal_perturbations[id.index()].normal(&scene.geometry, &scene.textures, &at, dp_dv),
+            ..at
+        }
     }
 
     #[cold]
@@ -150,11 +157,9 @@ impl<'a> World<'a> {
 
     /// Light that arrives from infinity along the unit `direction`.
     pub fn radiance_at_infinity(&self, direction: Vec3) -> Rgb {
-        self.scene
-            .lights
-            .at_infinity()
-            .iter()
-            .fold(Rgb::BLACK, |sum, &id| sum + self.scene.lights.get(id).eval_infinite(direction, MisCompensation::Off).radiance)
+        self.scene.lights.at_infinity().iter().fold(Rgb::BLACK, |sum, &id| {
+            sum + self.scene.lights.get(id).eval_infinite(direction, MisCompensation::Off).radiance
+        })
     }
 
     /// Moves camera rays that start far outside the scene along themselves (in `f64`) to just before the scene's box:
@@ -209,7 +214,11 @@ fn parametrization(scene: &Scene) -> Vec<Parametrization> {
             Parametrization::Uv
         }
     };
-    scene.surfaces.iter().map(|surface| if scene.features.parameters { of(surface) } else { Parametrization::Unused }).collect()
+    scene
+        .surfaces
+        .iter()
+        .map(|surface| if scene.features.parameters { of(surface) } else { Parametrization::Unused })
+        .collect()
 }
 
 /// Whether a material or one of those that it consists of has a property.

@@ -19,7 +19,8 @@ impl LightGroups {
 
     /// Groups by [`LightGroupId`], and the group of each light.
     pub fn new(names: Vec<String>, of_light: impl ExactSizeIterator<Item = Option<LightGroupId>>) -> Self {
-        let of_light = if names.is_empty() { Vec::new() } else { of_light.map(|id| id.map_or(NO_GROUP, |id| id.0)).collect() };
+        let of_light =
+            if names.is_empty() { Vec::new() } else { of_light.map(|id| id.map_or(NO_GROUP, |id| id.0)).collect() };
         Self { names, of_light }
     }
 

@@ -110,7 +110,8 @@ impl IesProfile {
         }
         let planes: Vec<f64> = (0..self.horizontal.len()).map(plane).collect();
         let range = f64::from(self.horizontal[self.horizontal.len() - 1] - self.horizontal[0]);
-        let between = |i: usize| 0.5 * (planes[i] + planes[i + 1]) * f64::from(self.horizontal[i + 1] - self.horizontal[i]);
+        let between =
+            |i: usize| 0.5 * (planes[i] + planes[i + 1]) * f64::from(self.horizontal[i + 1] - self.horizontal[i]);
         TAU * (0..planes.len() - 1).map(between).sum::<f64>() / range
     }
 
@@ -195,7 +196,11 @@ mod tests {
 
     #[test]
     fn intensities_are_bilinear_between_the_angles_measured() {
-        let p = profile(&[0.0, 40.0, 90.0], &[0.0, 90.0, 180.0, 360.0], &[8.0, 4.0, 0.0, 8.0, 2.0, 0.0, 8.0, 6.0, 2.0, 8.0, 4.0, 0.0]);
+        let p = profile(
+            &[0.0, 40.0, 90.0],
+            &[0.0, 90.0, 180.0, 360.0],
+            &[8.0, 4.0, 0.0, 8.0, 2.0, 0.0, 8.0, 6.0, 2.0, 8.0, 4.0, 0.0],
+        );
         for (theta, phi, expected) in [
             (0.0, 77.0, 8.0),
             (40.0, 0.0, 4.0),
@@ -222,7 +227,10 @@ mod tests {
         let half = profile(&vertical, &[0.0, 180.0], &[1.0, 2.0, 1.0, 6.0]);
         assert!((half.intensity(90.0, 45.0) - 3.0).abs() < 1e-5 && (half.intensity(90.0, 315.0) - 3.0).abs() < 1e-5);
         let other_half = profile(&vertical, &[90.0, 270.0], &[1.0, 2.0, 1.0, 6.0]);
-        assert!((other_half.intensity(90.0, 135.0) - 3.0).abs() < 1e-5 && (other_half.intensity(90.0, 45.0) - 3.0).abs() < 1e-5);
+        assert!(
+            (other_half.intensity(90.0, 135.0) - 3.0).abs() < 1e-5
+                && (other_half.intensity(90.0, 45.0) - 3.0).abs() < 1e-5
+        );
         assert!((other_half.intensity(90.0, 300.0) - other_half.intensity(90.0, 240.0)).abs() < 1e-5);
         let all_around = profile(&vertical, &[0.0], &[1.0, 2.0]);
         assert_eq!(all_around.intensity(90.0, 123.0), 2.0);
@@ -258,7 +266,11 @@ mod tests {
     fn a_hanging_light_turns_counter_clockwise_seen_from_above() {
         // Only towards the angle 90 from 0: without a turn 0 is +X, and counter-clockwise from above (with +X to the
         // right, +Z towards us) is -Z.
-        let table = Arc::new(profile(&[0.0, 180.0], &[0.0, 45.0, 90.0, 135.0, 360.0], &[0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]));
+        let table = Arc::new(profile(
+            &[0.0, 180.0],
+            &[0.0, 45.0, 90.0, 135.0, 360.0],
+            &[0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0],
+        ));
         let lit = |rotation: f64, p: DVec3| {
             let light = IesLight::new(DVec3::ZERO, -DVec3::Y, rotation, Rgb::WHITE, table.clone());
             light.sample(p).map_or(0.0, |s| s.radiance.g)

@@ -142,7 +142,9 @@ impl Light {
         match self {
             Self::Environment(light) => light.eval(wi, compensation),
             Self::Directional(light) => light.eval(wi),
-            Self::Area(_) | Self::Point(_) | Self::Spot(_) | Self::Projector(_) | Self::Ies(_) => InfiniteLightEval::default(),
+            Self::Area(_) | Self::Point(_) | Self::Spot(_) | Self::Projector(_) | Self::Ies(_) => {
+                InfiniteLightEval::default()
+            }
         }
     }
 

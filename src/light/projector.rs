@@ -125,7 +125,10 @@ mod tests {
 
     /// Red right of the middle below it and left of it above it, else green.
     fn textures() -> [Texture; 1] {
-        [Texture::Checker(Checker { colors: [Rgb::new(0.0, 1.0, 0.0), Rgb::new(1.0, 0.0, 0.0)], scale: vec2(1.0, 1.0) })]
+        [Texture::Checker(Checker {
+            colors: [Rgb::new(0.0, 1.0, 0.0), Rgb::new(1.0, 0.0, 0.0)],
+            scale: vec2(1.0, 1.0),
+        })]
     }
 
     fn projection(half: Vec2) -> TextureProjection {
@@ -141,7 +144,9 @@ mod tests {
             // The irradiance on a plane across the axis.
             light.sample(&textures, p).map(|sample| sample.radiance * sample.wi.z * (distance * distance) as f32)
         };
-        let near = |a: Option<Rgb>, b: Rgb| a.is_some_and(|a| (a - b).max_channel().abs() + (b - a).max_channel().abs() < 1e-5);
+        let near = |a: Option<Rgb>, b: Rgb| {
+            a.is_some_and(|a| (a - b).max_channel().abs() + (b - a).max_channel().abs() < 1e-5)
+        };
         let (red, green) = (Rgb::new(2.0, 0.0, 0.0), Rgb::new(0.0, 2.0, 0.0));
         for distance in [1.0, 3.0] {
             for x in [0.1, 0.9] {
@@ -166,8 +171,8 @@ mod tests {
         let textures = textures();
         let half = (0.5f64).tan() as f32;
         let projector = Projector::new(DVec3::ZERO, Rgb::splat(3.0), projection(vec2(0.8, 0.3)), &textures);
-        let spot =
-            SpotLight::new(DVec3::ZERO, DVec3::NEG_Z, Rgb::splat(3.0), 0.3, 0.5).with_texture(projection(Vec2::splat(half)), &textures);
+        let spot = SpotLight::new(DVec3::ZERO, DVec3::NEG_Z, Rgb::splat(3.0), 0.3, 0.5)
+            .with_texture(projection(Vec2::splat(half)), &textures);
         for (is_spot, power) in [(false, projector.power()), (true, spot.power())] {
             let sample = |p: DVec3| if is_spot { spot.sample(&textures, p) } else { projector.sample(&textures, p) };
             // Directions evenly in cosine and angle.

@@ -147,14 +147,21 @@ impl LightQueue {
         let Some(choice) = context.lights.choose(light_context, [u, v], context.compensation) else { return };
         (samples.light[lane], self.pmfs[lane]) = (choice.id.0, choice.pmf);
         match context.lights.get(choice.id) {
-            Light::Area(light) if self.area.push(light, choice.id, lane) || self.emitters.push(light, choice.id, lane) => {}
+            Light::Area(light)
+                if self.area.push(light, choice.id, lane) || self.emitters.push(light, choice.id, lane) => {}
             _ if context.lights.environment_map().is_some_and(|(id, _)| id == choice.id) => self.sky.lanes.push(lane),
             _ => self.alone.push((lane, choice.id)),
         }
     }
 
     /// Samples what was queued, and sets the targets of all vertices.
-    pub fn sample(&mut self, context: &LightContext, queries: &LightQueries, samples: &mut LightSampleRows, target_p: &mut Points) {
+    pub fn sample(
+        &mut self,
+        context: &LightContext,
+        queries: &LightQueries,
+        samples: &mut LightSampleRows,
+        target_p: &mut Points,
+    ) {
         let Self { pmfs, area, emitters, sky, alone } = self;
         area.sample(queries, pmfs, samples, target_p);
         let mut set = |lane: usize, sample: &LightSample| samples.set(lane, sample, pmfs[lane], target_p);
@@ -164,7 +171,9 @@ impl LightQueue {
         }
         for &(lane, id) in &*alone {
             let (p, u) = queries.get(lane);
-            if let Some(sample) = context.lights.get(id).sample(context.geometry, context.textures, p, u, context.compensation) {
+            if let Some(sample) =
+                context.lights.get(id).sample(context.geometry, context.textures, p, u, context.compensation)
+            {
                 set(lane, &sample);
             }
         }

@@ -80,8 +80,9 @@ impl LightSet {
         let bounds = geometry.bounds();
         let radius = if bounds.is_empty() { 1.0 } else { 0.5 * bounds.size().as_dvec3().length() };
         let powers = |compensation: MisCompensation| -> Vec<f64> {
-            let power =
-                |light: &Light| Some(light.sampled_power(radius, compensation)).filter(|p| *p > 0.0 && p.is_finite()).unwrap_or(0.0);
+            let power = |light: &Light| {
+                Some(light.sampled_power(radius, compensation)).filter(|p| *p > 0.0 && p.is_finite()).unwrap_or(0.0)
+            };
             lights.iter().map(power).collect()
         };
         let far: Vec<bool> = lights.iter().map(Light::is_at_infinity).collect();
@@ -101,7 +102,9 @@ impl LightSet {
         let distribution = |mut probabilities: Vec<f64>| {
             let mut tree_share = 0.0;
             if tree.is_some() {
-                tree_share = probabilities.iter().zip(&far).filter(|(_, far)| !**far).map(|(p, _)| p).sum::<f64>().min(1.0) as f32;
+                tree_share =
+                    probabilities.iter().zip(&far).filter(|(_, far)| !**far).map(|(p, _)| p).sum::<f64>().min(1.0)
+                        as f32;
                 probabilities.iter_mut().zip(&far).filter(|(_, far)| !**far).for_each(|(p, _)| *p = 0.0);
             }
             LightDistribution { table: AliasTable::new(&probabilities), tree_share }
@@ -205,7 +208,8 @@ impl LightDistribution {
 fn probabilities(powers: &[f64], far: &[bool]) -> Vec<f64> {
     // Relative to the strongest, no sum overflows.
     let strongest = powers.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    let total = |kind: bool| powers.iter().zip(far).filter(|(_, f)| **f == kind).map(|(p, _)| p / strongest).sum::<f64>();
+    let total =
+        |kind: bool| powers.iter().zip(far).filter(|(_, f)| **f == kind).map(|(p, _)| p / strongest).sum::<f64>();
     let count = |kind: bool| powers.iter().zip(far).filter(|(p, f)| **f == kind && **p > 0.0).count() as f64;
     let (near_total, far_total) = (total(false), total(true));
     let far_share = if count(true) == 0.0 {
@@ -280,7 +284,10 @@ mod tests {
     fn a_sharp_sun_is_not_visible_and_no_light_is_no_choice() {
         let lights = set(vec![Light::Directional(Box::new(DirectionalLight::new(-DVec3::Y, Rgb::WHITE, 0.0)))]);
         assert!(lights.at_infinity().is_empty() && lights.pmf(LightId(0), &ANYWHERE, MisCompensation::Off) == 1.0);
-        assert!(LightSet::default().choose(&ANYWHERE, [0.5, 0.0], MisCompensation::Off).is_none() && LightSet::default().is_empty());
+        assert!(
+            LightSet::default().choose(&ANYWHERE, [0.5, 0.0], MisCompensation::Off).is_none()
+                && LightSet::default().is_empty()
+        );
         assert!(set(vec![point(0.0)]).choose(&ANYWHERE, [0.5, 0.0], MisCompensation::Off).is_none());
     }
 }

@@ -88,7 +88,8 @@ impl SpotLight {
     /// For the choice of a light.
     pub(super) fn bounds(&self) -> Option<LightBounds> {
         // Of a texture, the mean.
-        let intensity = f64::from(self.source.intensity.luminance()) * self.power() / self.even_power().max(f64::MIN_POSITIVE);
+        let intensity =
+            f64::from(self.source.intensity.luminance()) * self.power() / self.even_power().max(f64::MIN_POSITIVE);
         let cone = EmissionCone { axis: self.axis, spread: self.beam as f32, reach: (self.cutoff - self.beam) as f32 };
         (intensity > 0.0).then(|| LightBounds::at_point(self.source.position, cone, intensity))
     }

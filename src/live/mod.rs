@@ -60,7 +60,10 @@ impl Live {
     /// running is no error.
     pub fn new(options: Options) -> Result<Self> {
         let statistics = Arc::new(Statistics::new(options.time_limit));
-        let preview = options.preview.map(|preview| Preview::new(&preview, options.name.clone(), Arc::clone(&statistics))).transpose()?;
+        let preview = options
+            .preview
+            .map(|preview| Preview::new(&preview, options.name.clone(), Arc::clone(&statistics)))
+            .transpose()?;
         let tev = options.tev.map(|tev| Tev::new(tev, &options.name));
         Ok(Self { statistics, pace: Pace::default(), tev, preview })
     }
@@ -106,7 +109,8 @@ impl Progress for Live {
     }
 
     fn needs_picture(&self) -> bool {
-        let is_needed = self.tev.as_ref().is_some_and(Tev::needs_picture) || self.preview.as_ref().is_some_and(Preview::needs_picture);
+        let is_needed = self.tev.as_ref().is_some_and(Tev::needs_picture)
+            || self.preview.as_ref().is_some_and(Preview::needs_picture);
         is_needed && self.pace.may_request()
     }
 

@@ -19,7 +19,11 @@ impl Snapshot {
         // Layers that only files have are here without values.
         let layers: Vec<Layer> = image.layers.iter().filter(|layer| !layer.data.is_empty()).cloned().collect();
         let names = layers.iter().map(channel_names).collect();
-        Self { image: Image { size: image.size, crop: image.crop, overscan: image.overscan, layers, coverage: None }, spp, names }
+        Self {
+            image: Image { size: image.size, crop: image.crop, overscan: image.overscan, layers, coverage: None },
+            spp,
+            names,
+        }
     }
 
     /// Every layer with the full names of its channels.
@@ -73,9 +77,13 @@ mod tests {
 
     #[test]
     fn layers_are_called_by_what_their_channels_share() {
-        let title = |names: &[&str]| Snapshot::title(&names.iter().map(ToString::to_string).collect::<Vec<_>>()).to_owned();
+        let title =
+            |names: &[&str]| Snapshot::title(&names.iter().map(ToString::to_string).collect::<Vec<_>>()).to_owned();
         assert_eq!(title(&["R", "G", "B", "A"]), "color");
-        assert_eq!((title(&["Z"]), title(&["N.X", "N.Y", "N.Z"]), title(&["stats.samples"])), ("Z".into(), "N".into(), "stats".into()));
+        assert_eq!(
+            (title(&["Z"]), title(&["N.X", "N.Y", "N.Z"]), title(&["stats.samples"])),
+            ("Z".into(), "N".into(), "stats".into())
+        );
     }
 
     #[test]

@@ -137,7 +137,10 @@ mod tests {
         statistics.plan(1600, 0.5, 0.25);
         statistics.end();
         let numbers = statistics.numbers();
-        assert_eq!((numbers.spp_planned, numbers.error, numbers.target_error, numbers.left), (16.0, Some(0.5), Some(0.25), Some(0.0)));
+        assert_eq!(
+            (numbers.spp_planned, numbers.error, numbers.target_error, numbers.left),
+            (16.0, Some(0.5), Some(0.25), Some(0.0))
+        );
         assert_eq!(statistics.numbers().elapsed, numbers.elapsed);
     }
 }

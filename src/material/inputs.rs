@@ -87,7 +87,9 @@ impl RangedInput {
     pub fn at(&self, textures: &[Texture], footprint: &Footprint) -> f32 {
         match *self {
             Self::Constant(value) => value,
-            Self::Texture { id, range: [low, high] } => low + (high - low) * ScalarInput::Texture(id).at(textures, footprint),
+            Self::Texture { id, range: [low, high] } => {
+                low + (high - low) * ScalarInput::Texture(id).at(textures, footprint)
+            }
         }
     }
 
@@ -127,7 +129,9 @@ impl AlphaInput {
     /// Alpha over `footprint`.
     #[inline]
     pub fn at(&self, textures: &[Texture], footprint: &Footprint) -> [f32; 2] {
-        self.axes.map(|input| input.at(textures, footprint)).map(|value| if self.squared { value * value } else { value })
+        self.axes
+            .map(|input| input.at(textures, footprint))
+            .map(|value| if self.squared { value * value } else { value })
     }
 
     /// Glossy or specular lobes, and whether they may be anisotropic.
@@ -215,13 +219,22 @@ impl PlasticCoat {
     /// The coat over `footprint` with a base of colour `diffuse`, a factor `tint` on what the coat reflects, and
     /// whether the base is [nonlinear](Plastic::nonlinear).
     #[inline]
-    pub(super) fn over(&self, diffuse: Rgb, tint: Rgb, nonlinear: bool, textures: &[Texture], footprint: &Footprint) -> Bsdf {
+    pub(super) fn over(
+        &self,
+        diffuse: Rgb,
+        tint: Rgb,
+        nonlinear: bool,
+        textures: &[Texture],
+        footprint: &Footprint,
+    ) -> Bsdf {
         match self {
             Self::Ggx(coat) => Bsdf::Plastic(Plastic { diffuse, coat: coat.at(textures, footprint), tint, nonlinear }),
             Self::SeparableGgx(coat) => {
                 Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(Plastic { diffuse, coat: *coat, tint, nonlinear }))
             }
-            Self::Beckmann(coat) => Bsdf::Beckmann(SingleScatteringBsdf::Plastic(Plastic { diffuse, coat: *coat, tint, nonlinear })),
+            Self::Beckmann(coat) => {
+                Bsdf::Beckmann(SingleScatteringBsdf::Plastic(Plastic { diffuse, coat: *coat, tint, nonlinear }))
+            }
         }
     }
 

@@ -152,7 +152,11 @@ impl Compaction {
             let within = count.saturating_sub(i * WIDTH).min(WIDTH);
             *mask = (chosen & ((1 << within) - 1)) as u16;
         }
-        Self { masks, count: masks.iter().map(|mask| mask.count_ones() as usize).sum(), instructions: Instructions::detect() }
+        Self {
+            masks,
+            count: masks.iter().map(|mask| mask.count_ones() as usize).sum(),
+            instructions: Instructions::detect(),
+        }
     }
 
     /// How many there are.
@@ -219,7 +223,14 @@ impl Compaction {
 
     /// [`append`](Self::append) by vectors.
     #[inline(always)]
-    fn compress<T: Compact>(&self, by: impl Compress, from: &Row<T>, to: &mut Row<T>, mut next: Option<&mut Row<T>>, mut at: usize) {
+    fn compress<T: Compact>(
+        &self,
+        by: impl Compress,
+        from: &Row<T>,
+        to: &mut Row<T>,
+        mut next: Option<&mut Row<T>>,
+        mut at: usize,
+    ) {
         for (&bits, numbers) in self.masks.iter().zip(from.as_chunks::<WIDTH>().0) {
             let count = bits.count_ones() as usize;
             // Of a length that the compiler knows: else each is a call.
@@ -246,7 +257,13 @@ impl Compaction {
 
     /// [`append`](Self::append) for three rows.
     #[inline]
-    pub fn append_3<T: Compact>(&self, from: &[Row<T>; 3], to: &mut [Row<T>; 3], next: Option<&mut [Row<T>; 3]>, at: usize) {
+    pub fn append_3<T: Compact>(
+        &self,
+        from: &[Row<T>; 3],
+        to: &mut [Row<T>; 3],
+        next: Option<&mut [Row<T>; 3]>,
+        at: usize,
+    ) {
         match next {
             None => (0..3).for_each(|k| self.append(&from[k], &mut to[k], None, at)),
             Some(next) => (0..3).for_each(|k| self.append(&from[k], &mut to[k], Some(&mut next[k]), at)),

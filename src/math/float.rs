@@ -61,12 +61,30 @@ mod tests {
 
     #[test]
     fn floors_are_those_of_the_standard_library() {
-        let odd =
-            [0.0, -0.0, 0.5, -0.5, 1.0 - 6e-8, -1e-45, 8_388_607.5, -8_388_607.5, 8_388_608.0, -8_388_609.0, 3e9, -3e9, f32::MAX, f32::MIN];
+        let odd = [
+            0.0,
+            -0.0,
+            0.5,
+            -0.5,
+            1.0 - 6e-8,
+            -1e-45,
+            8_388_607.5,
+            -8_388_607.5,
+            8_388_608.0,
+            -8_388_609.0,
+            3e9,
+            -3e9,
+            f32::MAX,
+            f32::MIN,
+        ];
         for x in odd.into_iter().chain((-2000..2000).map(|i| i as f32 * 0.37)) {
             assert_eq!(floor(x), x.floor(), "{x}");
         }
-        assert!(floor(f32::NAN).is_nan() && floor(f32::INFINITY) == f32::INFINITY && floor(f32::NEG_INFINITY) == f32::NEG_INFINITY);
+        assert!(
+            floor(f32::NAN).is_nan()
+                && floor(f32::INFINITY) == f32::INFINITY
+                && floor(f32::NEG_INFINITY) == f32::NEG_INFINITY
+        );
     }
 
     #[test]

@@ -20,7 +20,11 @@ impl Frame {
         let sign = 1f32.copysign(n.z);
         let a = -1.0 / (sign + n.z);
         let b = n.x * n.y * a;
-        Self { x: Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), y: Vec3::new(b, sign + n.y * n.y * a, -n.y), z: n }
+        Self {
+            x: Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
+            y: Vec3::new(b, sign + n.y * n.y * a, -n.y),
+            z: n,
+        }
     }
 
     /// A frame around the unit normal `n` whose `x` is `tangent` without its part along `n`; any frame if nothing is
@@ -58,9 +62,11 @@ mod tests {
     fn frames_are_orthonormal_and_right_handed() {
         let normals = [Vec3::Z, -Vec3::Z, Vec3::X, Vec3::new(0.6, 0.0, -0.8), Vec3::new(1e-4, 0.0, -1.0).normalize()];
         for n in normals {
-            for f in
-                [Frame::from_normal(n), Frame::from_normal_and_tangent(n, Vec3::new(0.3, 1.0, 0.2)), Frame::from_normal_and_tangent(n, n)]
-            {
+            for f in [
+                Frame::from_normal(n),
+                Frame::from_normal_and_tangent(n, Vec3::new(0.3, 1.0, 0.2)),
+                Frame::from_normal_and_tangent(n, n),
+            ] {
                 assert!(f.x.dot(f.y).abs() < 1e-6 && f.y.dot(f.z).abs() < 1e-6 && f.z.dot(f.x).abs() < 1e-6, "{f:?}");
                 assert!((f.x.length() - 1.0).abs() < 1e-6 && (f.y.length() - 1.0).abs() < 1e-6);
                 assert!((f.x.cross(f.y) - f.z).length() < 1e-6, "{f:?}");

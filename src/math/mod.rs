@@ -25,6 +25,8 @@ pub use motion::Motion;
 pub use random::Rng;
 pub use ray::{Ray, RayF64, RayRows};
 pub use render_space::RenderSpace;
-pub use roots::{Bracket, Quadratic, bisect, difference_of_products, newton_in_bracket, quadratic_roots, solve_quadratic};
+pub use roots::{
+    Bracket, Quadratic, bisect, difference_of_products, newton_in_bracket, quadratic_roots, solve_quadratic,
+};
 pub use transform::Transform;
 pub use trig::{angle_of, sin_cos_eighth, sin_cos_turns, unit_circle};

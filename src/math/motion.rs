@@ -361,7 +361,10 @@ mod tests {
             assert!(close(motion.map_at(time), DAffine3::from_axis_angle(axis, angle)), "{time}");
         }
         assert!(motion.as_constant().is_none());
-        assert!(close(Motion::turning(axis, &[(3.0, 2.0)]).unwrap().as_constant().unwrap(), DAffine3::from_axis_angle(axis, 2.0)));
+        assert!(close(
+            Motion::turning(axis, &[(3.0, 2.0)]).unwrap().as_constant().unwrap(),
+            DAffine3::from_axis_angle(axis, 2.0)
+        ));
         for bad in [&[][..], &[(0.0, 1.0), (0.0, 2.0)], &[(f64::NAN, 1.0)], &[(0.0, f64::INFINITY)]] {
             assert!(Motion::turning(axis, bad).is_none(), "{bad:?}");
         }
@@ -397,7 +400,9 @@ mod tests {
             let Some(outer) = Motion::keyframed(&[(-0.2, map()), (1.3, map())]) else { continue };
             let cube = Bounds { min: DVec3::new(-1.0, -0.5, 0.2), max: DVec3::new(0.4, 0.7, 1.0) };
             let axis = DVec3::new(next(), next(), next()).normalize();
-            let turning = |turns: f64| Motion::turning(axis, &[(-0.1, 0.0), (0.6, turns * next()), (1.0, turns * next())]).unwrap();
+            let turning = |turns: f64| {
+                Motion::turning(axis, &[(-0.1, 0.0), (0.6, turns * next()), (1.0, turns * next())]).unwrap()
+            };
             let [some, many] = [4.0, 400.0].map(turning);
             let pivot = DAffine3::from_translation(DVec3::new(2.0, 1.0, -3.0));
             let about = Motion::constant(pivot).after(&many).after(&Motion::constant(pivot.inverse()));

@@ -118,7 +118,12 @@ mod tests {
     fn the_generator_is_splitmix64() {
         // The first outputs for seed 1234567, as published with other implementations.
         let mut rng = Rng::new(1_234_567);
-        let expected = [6_457_827_717_110_365_317, 3_203_168_211_198_807_973, 9_817_491_932_198_370_423, 4_593_380_528_125_082_431];
+        let expected = [
+            6_457_827_717_110_365_317,
+            3_203_168_211_198_807_973,
+            9_817_491_932_198_370_423,
+            4_593_380_528_125_082_431,
+        ];
         assert_eq!([rng.bits(), rng.bits(), rng.bits(), rng.bits()], expected);
     }
 

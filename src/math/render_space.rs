@@ -46,7 +46,11 @@ impl RenderSpace {
         }
         let all = shapes.iter().fold(Bounds::EMPTY, |all, b| all.union(b));
         let reach = |from: DVec3| (all.min - from).abs().max((all.max - from).abs()).max_element();
-        let smallest = shapes.iter().map(|b| (b.max - b.min).max_element()).filter(|&size| size > 0.0).fold(f64::INFINITY, f64::min);
+        let smallest = shapes
+            .iter()
+            .map(|b| (b.max - b.min).max_element())
+            .filter(|&size| size > 0.0)
+            .fold(f64::INFINITY, f64::min);
         let middle = middle(&shapes);
         let distance = middle.abs().max_element();
         let moves = distance > LEAST_GAIN * reach(middle) && distance > NEAR * smallest;
@@ -101,7 +105,10 @@ impl RenderSpace {
     /// A map to the world, as one to this space. The translation is exact to the last bits of the difference.
     #[must_use]
     pub fn place(&self, world_from_object: &DAffine3) -> DAffine3 {
-        DAffine3 { matrix3: world_from_object.matrix3 * self.scale, translation: self.point(world_from_object.translation) }
+        DAffine3 {
+            matrix3: world_from_object.matrix3 * self.scale,
+            translation: self.point(world_from_object.translation),
+        }
     }
 
     /// A rotation and translation to the world, as one to this space.
@@ -113,7 +120,11 @@ impl RenderSpace {
     /// A motion in the world, as one in this space.
     #[must_use]
     pub fn place_motion(&self, world_from_object: &Motion) -> Motion {
-        if self.is_world() { world_from_object.clone() } else { Motion::constant(self.from_world()).after(world_from_object) }
+        if self.is_world() {
+            world_from_object.clone()
+        } else {
+            Motion::constant(self.from_world()).after(world_from_object)
+        }
     }
 
     /// The map that undoes a scale.
@@ -180,10 +191,15 @@ mod tests {
     #[test]
     fn scenes_far_away_are_moved_to_most_of_their_shapes() {
         let far = DVec3::new(5e6, 123_456.7, -2e6);
-        let shapes = [cube(far, 1.0), cube(far + 0.25, 0.1), cube(far - 0.5, 0.1), cube(far + DVec3::new(1e5, 0.0, 0.0), 1e3)];
+        let shapes =
+            [cube(far, 1.0), cube(far + 0.25, 0.1), cube(far - 0.5, 0.1), cube(far + DVec3::new(1e5, 0.0, 0.0), 1e3)];
         let space = RenderSpace::around(&shapes);
         assert!(space.point(far).abs().max_element() < 1.0 && space.scale() == 1.0, "{space:?}");
-        let map = DAffine3::from_scale_rotation_translation(DVec3::splat(2.0), super::super::DQuat::from_rotation_x(0.3), far);
+        let map = DAffine3::from_scale_rotation_translation(
+            DVec3::splat(2.0),
+            super::super::DQuat::from_rotation_x(0.3),
+            far,
+        );
         let p = DVec3::new(0.3, -0.2, 1.0);
         let placed = space.place(&map).transform_point3(p);
         assert!((space.world_point(placed) - map.transform_point3(p)).length() < 1e-8);

@@ -116,7 +116,8 @@ mod tests {
         let cubic = |s: f64| ((s - 0.3) * (s - 1.4) * (s + 2.0), (s - 1.4) * (s + 2.0) + (s - 0.3) * (2.0 * s + 0.6));
         let flat = |s: f64| ((s - 0.7).powi(5), 5.0 * (s - 0.7).powi(4));
         let cusp = |s: f64| ((s - 0.2).cbrt(), f64::NAN);
-        let bracket = |f: &dyn Fn(f64) -> (f64, f64)| Bracket { lo: 0.0, hi: 1.0, at_lo: f(0.0).0, at_hi: f(1.0).0, guess: 0.5 };
+        let bracket =
+            |f: &dyn Fn(f64) -> (f64, f64)| Bracket { lo: 0.0, hi: 1.0, at_lo: f(0.0).0, at_hi: f(1.0).0, guess: 0.5 };
         assert!((newton_in_bracket(&bracket(&cubic), cubic) - 0.3).abs() < 1e-15);
         assert!((newton_in_bracket(&bracket(&flat), flat) - 0.7).abs() < 1e-8);
         assert!((newton_in_bracket(&bracket(&cusp), cusp) - 0.2).abs() < 1e-15);

@@ -166,7 +166,11 @@ impl Element for DVec3 {
 /// one loop writes belong into different structures: where all rows are alike, the compiler sees that they do not
 /// overlap.
 macro_rules! soa {
-    ($(#[$meta:meta])* $vis:vis struct $rows:ident of $item:ident { $($(#[$field_meta:meta])* $field:ident: $type:ty,)* }) => {
+    (
+        $(#[$meta:meta])* $vis:vis struct $rows:ident of $item:ident {
+            $($(#[$field_meta:meta])* $field:ident: $type:ty,)*
+        }
+    ) => {
         $(#[$meta])*
         #[derive(Clone, Copy, Debug)]
         $vis struct $item { $($(#[$field_meta])* pub $field: $type,)* }

@@ -96,8 +96,9 @@ impl Transform {
         let lengths = [m.x_axis.length(), m.y_axis.length(), m.z_axis.length()];
         let scale = lengths[0];
         let equal = lengths.iter().all(|l| (l - scale).abs() <= 1e-9 * scale);
-        let orthogonal =
-            [m.x_axis.dot(m.y_axis), m.y_axis.dot(m.z_axis), m.z_axis.dot(m.x_axis)].iter().all(|d| d.abs() <= 1e-9 * scale * scale);
+        let orthogonal = [m.x_axis.dot(m.y_axis), m.y_axis.dot(m.z_axis), m.z_axis.dot(m.x_axis)]
+            .iter()
+            .all(|d| d.abs() <= 1e-9 * scale * scale);
         (equal && orthogonal).then_some(scale)
     }
 

@@ -43,15 +43,18 @@ pub struct Comparison {
 pub fn compare(reference: &Image, test: &Image) -> Result<Comparison> {
     let (r, t) = (reference.crop, test.crop);
     if [r.width, r.height] != [t.width, t.height] {
-        let message =
-            format!("the pictures differ in size: the reference has {}x{} pixels, the test {}x{}", r.width, r.height, t.width, t.height);
+        let message = format!(
+            "the pictures differ in size: the reference has {}x{} pixels, the test {}x{}",
+            r.width, r.height, t.width, t.height
+        );
         return Err(Error::Usage(message));
     }
     let (Some(reference), Some(test)) = (reference.layer(LayerKind::Color), test.layer(LayerKind::Color)) else {
         return Err(Error::Usage("a picture to compare has no colour".to_owned()));
     };
     let mut sums = Sums::default();
-    let relative: Vec<f64> = reference.pixels().zip(test.pixels()).map(|(reference, test)| sums.add(&reference[..3], &test[..3])).collect();
+    let relative: Vec<f64> =
+        reference.pixels().zip(test.pixels()).map(|(reference, test)| sums.add(&reference[..3], &test[..3])).collect();
     let values = 3.0 * r.area() as f64;
     let mse = sums.squares / values;
     let peak = sums.peak.unwrap_or(0.0);
@@ -141,7 +144,10 @@ mod tests {
         assert!((c.relmse - (1998.0 * 0.01 + 10000.0 + 2500.0 / 3.0) / 1.01 / 2000.0).abs() < 1e-4, "{c:?}");
         // Of few pixels the worst one goes, but never the only one.
         let few = compare(&picture(&[[1.0; 3]; 2]), &picture(&[[1.0; 3], [2.0; 3]])).unwrap();
-        assert_eq!((few.relmse_trimmed, compare(&picture(&[[1.0; 3]]), &picture(&[[2.0; 3]])).unwrap().relmse_trimmed > 0.9), (0.0, true));
+        assert_eq!(
+            (few.relmse_trimmed, compare(&picture(&[[1.0; 3]]), &picture(&[[2.0; 3]])).unwrap().relmse_trimmed > 0.9),
+            (0.0, true)
+        );
     }
 
     #[test]

@@ -45,10 +45,12 @@ impl Format {
     /// # Errors
     /// [`Error::Usage`] if there is none.
     pub fn from_path(path: &Path) -> Result<Self> {
-        let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default().to_ascii_lowercase();
+        let extension =
+            path.extension().and_then(|extension| extension.to_str()).unwrap_or_default().to_ascii_lowercase();
         Self::ALL.iter().find(|(_, name)| *name == extension).map(|(format, _)| *format).ok_or_else(|| {
             let known: Vec<String> = Self::ALL.iter().map(|(_, name)| format!(".{name}")).collect();
-            let what = if extension.is_empty() { "no extension".to_owned() } else { format!("the extension .{extension}") };
+            let what =
+                if extension.is_empty() { "no extension".to_owned() } else { format!("the extension .{extension}") };
             Error::Usage(format!("output {} has {what}; known are {}", path.display(), known.join(" and ")))
         })
     }
@@ -105,8 +107,8 @@ pub struct RenderStatistics {
 /// The files that writing an output makes: itself, and the names of Cryptomatte beside it.
 pub fn files_of_output(output: &OutputDesc) -> Vec<PathBuf> {
     let file = PathBuf::from(&output.file);
-    let beside =
-        output.crypto_manifest == CryptoManifestDesc::Sidecar && Format::from_path(&file).is_ok_and(|format| format == Format::Exr);
+    let beside = output.crypto_manifest == CryptoManifestDesc::Sidecar
+        && Format::from_path(&file).is_ok_and(|format| format == Format::Exr);
     let sidecars = cryptomatte::TYPES.iter().filter(|_| beside).map(|name| exr::sidecar_path(&file, name));
     std::iter::once(file.clone()).chain(sidecars).collect()
 }

@@ -88,7 +88,10 @@ mod tests {
         // Middle grey.
         let grey = encode_view(&picture([64, 64], |_| 0.18), ViewDesc::Agx);
         assert!(grey.iter().all(|byte| (127..=128).contains(byte)));
-        assert!(bytes(0.0, ViewDesc::Agx) != bytes(0.0, ViewDesc::Srgb) && bytes(0.0, ViewDesc::Agx) != bytes(0.0, ViewDesc::Filmic));
+        assert!(
+            bytes(0.0, ViewDesc::Agx) != bytes(0.0, ViewDesc::Srgb)
+                && bytes(0.0, ViewDesc::Agx) != bytes(0.0, ViewDesc::Filmic)
+        );
     }
 
     fn encode_view(image: &Image, view: ViewDesc) -> Vec<u8> {

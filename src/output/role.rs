@@ -20,8 +20,18 @@ pub enum Role {
 }
 
 /// Passes by their names in lower case without spaces, hyphens and underscores.
-const IDS: &[&str] =
-    &["id", "objectid", "materialid", "instanceid", "primitiveid", "primid", "objectindex", "materialindex", "indexob", "indexma"];
+const IDS: &[&str] = &[
+    "id",
+    "objectid",
+    "materialid",
+    "instanceid",
+    "primitiveid",
+    "primid",
+    "objectindex",
+    "materialindex",
+    "indexob",
+    "indexma",
+];
 const PRECISE: &[&str] = &[
     "z",
     "depth",
@@ -45,8 +55,18 @@ const PRECISE: &[&str] = &[
     "variance",
     "relativevariance",
 ];
-const DIRECTIONS: &[&str] =
-    &["n", "ng", "ns", "normal", "normals", "geometricnormal", "shadingnormal", "featurenormal", "denoisingnormal", "tangent"];
+const DIRECTIONS: &[&str] = &[
+    "n",
+    "ng",
+    "ns",
+    "normal",
+    "normals",
+    "geometricnormal",
+    "shadingnormal",
+    "featurenormal",
+    "denoisingnormal",
+    "tangent",
+];
 
 impl Role {
     /// The role of a channel of this full name.
@@ -96,10 +116,14 @@ mod tests {
             (Role::Direction, "N.X Ng.Z feature_normal.Y ViewLayer.Normal.X Ns.Y Tangent.X"),
             (
                 Role::Precise,
-                "Z P.X uv.U uv.V UV.A motion.X forward.u ViewLayer.Depth.Z Vector.W stats.samples variance.R Variance.G u v depth.Z",
+                "Z P.X uv.U uv.V UV.A motion.X forward.u ViewLayer.Depth.Z Vector.W stats.samples variance.R \
+                 Variance.G u v depth.Z",
             ),
             (Role::Id, "object_id.id material_id.id ViewLayer.Object Index.X IndexOB.X instance_id.id"),
-            (Role::Crypto, "CryptoObject00.r ViewLayer.CryptoMaterial02.a cryptoAsset01.R CryptoObject.r uCryptoMine00.g"),
+            (
+                Role::Crypto,
+                "CryptoObject00.r ViewLayer.CryptoMaterial02.a cryptoAsset01.R CryptoObject.r uCryptoMine00.g",
+            ),
         ] {
             for name in names.replace("Object Index", "Object_Index").split(' ') {
                 assert_eq!(Role::of(name), role, "{name}");

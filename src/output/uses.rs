@@ -59,7 +59,11 @@ impl FileUses {
         }
         let name = |file: &Use| format!("{} ({})", file.path.display(), file.purpose);
         let (known, new) = if known.written && !new.written { (&new, known) } else { (known, &new) };
-        let why = if known.written { "both would be written to one file" } else { "the one is read and the other would overwrite it" };
+        let why = if known.written {
+            "both would be written to one file"
+        } else {
+            "the one is read and the other would overwrite it"
+        };
         Err(Error::Usage(format!("{} and {}: {why}; choose another name", name(known), name(new))))
     }
 }
@@ -112,7 +116,9 @@ mod tests {
                 assert!(read.contains(&part), "{read}");
             }
             assert!(
-                matches!(&written, Error::Usage(message) if message.contains("(--json)") && message.contains("(--output)")),
+                matches!(
+                    &written, Error::Usage(message) if message.contains("(--json)") && message.contains("(--output)")
+                ),
                 "{written}"
             );
         }
@@ -134,7 +140,9 @@ mod tests {
             assert!(!clash(dir, "other", name), "{name}");
         }
         // Files that are not there yet, in folders that are there or not.
-        for (a, b) in [("new", "./new"), ("sub/new", "folder/new"), ("none/new", "./none/new"), ("none/new", "none/x/../new")] {
+        for (a, b) in
+            [("new", "./new"), ("sub/new", "folder/new"), ("none/new", "./none/new"), ("none/new", "none/x/../new")]
+        {
             assert!(clash(dir, a, b), "{a} {b}");
         }
         for (a, b) in [("new", "sub/new"), ("new", "New"), ("none/new", "none/new2")] {

@@ -112,10 +112,18 @@ mod tests {
                 let light = (-30.0 + 0.015 * i as f32).exp2();
                 let grey = code_values(view, Rgb::splat(light)).to_array();
                 assert!(close(grey[0], grey[1]) && close(grey[1], grey[2]), "{view:?} {light}: {grey:?}");
-                assert!((0..3).all(|c| grey[c] >= last[c] - 1e-6 && (0.0..=1.0).contains(&grey[c])), "{view:?} {light}");
+                assert!(
+                    (0..3).all(|c| grey[c] >= last[c] - 1e-6 && (0.0..=1.0).contains(&grey[c])),
+                    "{view:?} {light}"
+                );
                 last = grey;
             }
-            for light in [Rgb::new(-1.0, 2.0, 0.0), Rgb::new(f32::MAX, 0.0, 1.0), Rgb::splat(f32::INFINITY), Rgb::splat(-f32::INFINITY)] {
+            for light in [
+                Rgb::new(-1.0, 2.0, 0.0),
+                Rgb::new(f32::MAX, 0.0, 1.0),
+                Rgb::splat(f32::INFINITY),
+                Rgb::splat(-f32::INFINITY),
+            ] {
                 let code = code_values(view, light).to_array();
                 assert!(code.iter().all(|c| (0.0..=1.0).contains(c)), "{view:?} {light:?}: {code:?}");
             }

@@ -47,7 +47,11 @@ impl RenderSession<'_> {
     ///
     /// # Errors
     /// As [`render`](super::render()); [`Error::Usage`] as [`check_kept`] has it.
-    pub fn render(&self, mut state: RenderState, checkpoints: Option<&mut Checkpoints>) -> Result<(RenderState, Stats)> {
+    pub fn render(
+        &self,
+        mut state: RenderState,
+        checkpoints: Option<&mut Checkpoints>,
+    ) -> Result<(RenderState, Stats)> {
         check_kept(self.settings, state.shard)?;
         let cancel = Cancel::new(self.stop, self.settings.time_limit);
         let mut renderer = TileRenderer::new(self.scene, self.accel, self.settings);
@@ -55,7 +59,8 @@ impl RenderSession<'_> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.settings.threads).build();
         let pool = pool.map_err(|e| Error::Threads { count: self.settings.threads, message: e.to_string() })?;
         let workspaces = (0..pool.current_num_threads()).map(|_| Mutex::default()).collect();
-        let mut driver = Driver { session: self, renderer, pool, workspaces, start: Instant::now(), cancel: &cancel, checkpoints };
+        let mut driver =
+            Driver { session: self, renderer, pool, workspaces, start: Instant::now(), cancel: &cancel, checkpoints };
         let stats = driver.run(&mut state);
         self.check_time(&stats, state.done)?;
         let (nan_samples, dropped) = state.dropped();
@@ -93,7 +98,8 @@ impl Driver<'_> {
         let mut stats = Stats::default();
         state.start(self.session);
         let all = state.film.tiles().len();
-        let mut size = PassSize { samples: 1, tiles: if self.max_pass_time().is_some() { FIRST_TILES.min(all) } else { all } };
+        let mut size =
+            PassSize { samples: 1, tiles: if self.max_pass_time().is_some() { FIRST_TILES.min(all) } else { all } };
         // Of one sample of one tile, by the last pass.
         let mut tile_time = None;
         loop {

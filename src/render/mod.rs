@@ -5,6 +5,7 @@
 
 mod driver;
 mod exr_overrides;
+mod overrides;
 mod pixel_order;
 mod planner;
 mod progress;
@@ -15,9 +16,10 @@ mod tile_renderer;
 
 pub use driver::RenderSession;
 pub use exr_overrides::ExrOverrides;
+pub use overrides::Overrides;
 pub use progress::{Progress, Silent};
 pub use provenance::{RenderProvenance, SequenceFrame};
-pub use settings::{DEFAULT_EXTENSIONS, Overrides, Settings, threads};
+pub use settings::{DEFAULT_EXTENSIONS, Settings, threads};
 pub use state::{Checkpoints, Header, Merged, RenderState, Shard, StateFile, check_kept, merge};
 
 use std::sync::atomic::AtomicBool;
@@ -140,13 +142,21 @@ pub struct Replayed {
 ///
 /// # Errors
 /// If the pixel lies outside the film.
-pub fn replay(scene: &Scene, accel: &dyn Accelerator, settings: &Settings, pixel: [u32; 2], sample: u32) -> Result<Replayed> {
+pub fn replay(
+    scene: &Scene,
+    accel: &dyn Accelerator,
+    settings: &Settings,
+    pixel: [u32; 2],
+    sample: u32,
+) -> Result<Replayed> {
     let [width, height] = settings.film_size();
     if pixel[0] >= width || pixel[1] >= height {
         return Err(Error::Usage(format!("--pixel {},{}: the film has {width}x{height} pixels", pixel[0], pixel[1])));
     }
     if settings.is_guided() {
-        return Err(Error::Usage("--pixel: with guiding, a sample depends on all that were before; replay it with --guiding off".into()));
+        return Err(Error::Usage(
+            "--pixel: with guiding, a sample depends on all that were before; replay it with --guiding off".into(),
+        ));
     }
     let renderer = TileRenderer::new(scene, accel, settings);
     let pixel = pixel.map(|x| x + renderer.grid.offset);
@@ -156,6 +166,9 @@ pub fn replay(scene: &Scene, accel: &dyn Accelerator, settings: &Settings, pixel
     let slot = slot_of_pixel([pixel[0] - origin[0], pixel[1] - origin[1]]);
     let place = slots(renderer.grid.area, origin).position(|other| other == slot);
     let out = &workspace.integrator.out;
-    let replayed = |place: usize| Replayed { pixel: out.pixels[place], surface: out.surfaces.get(place).copied().unwrap_or_default() };
+    let replayed = |place: usize| Replayed {
+        pixel: out.pixels[place],
+        surface: out.surfaces.get(place).copied().unwrap_or_default(),
+    };
     place.map(replayed).ok_or_else(|| Error::Internal(format!("pixel {pixel:?} has no slot")))
 }

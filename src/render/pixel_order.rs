@@ -46,7 +46,10 @@ mod tests {
     #[test]
     fn batches_have_every_pixel_of_the_picture_and_hardly_more() {
         let count = |size, origin| slots(Crop::full(size), origin).count();
-        assert_eq!([count([64, 64], [32, 32]), count([50, 37], [0, 0]), count([50, 37], [32, 32])], [1024, 1024, 5 * 2 * 16]);
+        assert_eq!(
+            [count([64, 64], [32, 32]), count([50, 37], [0, 0]), count([50, 37], [32, 32])],
+            [1024, 1024, 5 * 2 * 16]
+        );
         assert_eq!(slots(Crop { x: 31, y: 30, width: 40, height: 40 }, [0, 0]).count(), 16);
         for size in [[1, 1], [50, 37], [33, 64]] {
             for pixel in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| [x, y])) {

@@ -144,34 +144,54 @@ impl RenderProvenance {
             Some(Some(VERSION)) => {}
             Some(version) => {
                 let found = version.map_or_else(|| "no number".to_owned(), |version| version.to_string());
-                return Err(malformed(format!("its provenance has version {found}, supported is {VERSION}: render the scene itself")));
+                return Err(malformed(format!(
+                    "its provenance has version {found}, supported is {VERSION}: render the scene itself"
+                )));
             }
             None => {
-                let message =
-                    "its provenance has no version: it was written by an earlier steradian, as a command line; render the scene itself";
+                let message = "its provenance has no version: it was written by an earlier steradian, as a command \
+                               line; render the scene itself";
                 return Err(malformed(message.to_owned()));
             }
         }
-        let provenance: Self = serde_path_to_error::deserialize(value).map_err(|e| malformed(format!("its provenance: {e}")))?;
+        let provenance: Self =
+            serde_path_to_error::deserialize(value).map_err(|e| malformed(format!("its provenance: {e}")))?;
         provenance.check(file)?;
         Ok(provenance)
     }
 
     /// Whether numbers are such as scenes and the command line may have.
     fn check(&self, file: &Path) -> Result<()> {
-        let Settings { size: [width, height], overscan, crop, filter, spp, target_error, ref integrator, .. } = self.settings;
-        let fault = |path: &str, message: &str| Error::Scene { file: file.to_owned(), path: path.to_owned(), message: message.to_owned() };
+        let Settings { size: [width, height], overscan, crop, filter, spp, target_error, ref integrator, .. } =
+            self.settings;
+        let fault = |path: &str, message: &str| Error::Scene {
+            file: file.to_owned(),
+            path: path.to_owned(),
+            message: message.to_owned(),
+        };
         let require = |valid: bool, path: &str, message: &str| if valid { Ok(()) } else { Err(fault(path, message)) };
-        check_film_and_integrator(&FilmDesc { width, height, overscan, filter, ..FilmDesc::default() }, integrator, file)?;
+        check_film_and_integrator(
+            &FilmDesc { width, height, overscan, filter, ..FilmDesc::default() },
+            integrator,
+            file,
+        )?;
         let film = self.settings.film_size();
         require(crop.fits(film), "settings.crop", "must have an area and lie within the picture")?;
         require(overscan == 0 || crop == Crop::full(film), "settings.crop", "must be all of a picture with overscan")?;
         require(spp > 0, "settings.spp", "must be at least 1")?;
-        require(target_error.is_none_or(|error| error > 0.0 && error.is_finite()), "settings.target_error", "must be above 0")?;
+        require(
+            target_error.is_none_or(|error| error > 0.0 && error.is_finite()),
+            "settings.target_error",
+            "must be above 0",
+        )?;
         let guided = self.settings.is_guided() && target_error.is_some();
         require(!guided, "settings.target_error", "must be null with guiding")?;
         require(self.import.time.is_finite(), "import.time", "must be finite")?;
-        require(self.frame.is_none_or(|frame| i32::try_from(frame.number).is_ok()), "frame.number", "must fit 32 bits")?;
+        require(
+            self.frame.is_none_or(|frame| i32::try_from(frame.number).is_ok()),
+            "frame.number",
+            "must fit 32 bits",
+        )?;
         require(
             self.frame.is_none_or(|frame| frame.per_second > 0.0 && frame.per_second.is_finite()),
             "frame.per_second",
@@ -229,7 +249,8 @@ mod tests {
         let provenance = RenderProvenance::from_value(provenance(), Path::new("a.exr")).unwrap();
         let of_frame = |number: i64| {
             let settings = Settings { seed: 5u64.wrapping_add_signed(number), ..provenance.settings.clone() };
-            RenderProvenance { frame: Some(SequenceFrame { number, per_second: 24.0 }), settings, ..provenance.clone() }.of_frame(number)
+            RenderProvenance { frame: Some(SequenceFrame { number, per_second: 24.0 }), settings, ..provenance.clone() }
+                .of_frame(number)
         };
         let differences = |own: &RenderProvenance, output: &OutputDesc| own.differences(&of_frame(-7), output);
         let output = OutputDesc::new("b.exr");
@@ -238,7 +259,8 @@ mod tests {
         (other.settings.spp, other.denoise, other.scene.whole) = (provenance.settings.spp + 1, true, "x".into());
         other.scene.scene = "x".into();
         let spp = format!("spp: {} in the file, {} for the rest", other.settings.spp, provenance.settings.spp);
-        let expected = ["another scene: the scene's description", "denoise: true in the file, false for the rest", &spp];
+        let expected =
+            ["another scene: the scene's description", "denoise: true in the file, false for the rest", &spp];
         assert_eq!(differences(&other, &output), expected);
         let commented = OutputDesc { comments: Some("other".into()), ..output };
         assert_eq!(differences(&of_frame(3), &commented), ["output.comments: none in the file, other for the rest"]);
@@ -246,7 +268,9 @@ mod tests {
 
     #[test]
     fn recipes_of_other_versions_are_refused() {
-        for (version, message) in [(Value::Null, "version no number"), (2.into(), "version 2"), ("1".into(), "version no number")] {
+        for (version, message) in
+            [(Value::Null, "version no number"), (2.into(), "version 2"), ("1".into(), "version no number")]
+        {
             let mut value = provenance();
             value["version"] = version;
             assert!(refusal(value).contains(message));
@@ -260,11 +284,16 @@ mod tests {
     /// No object in a recipe takes an unknown key, and no required key may be missing.
     #[test]
     fn unknown_keys_are_refused_at_every_level() {
-        for place in ["", "/scene", "/import", "/frame", "/settings", "/settings/filter", "/settings/integrator", "/output"] {
+        for place in
+            ["", "/scene", "/import", "/frame", "/settings", "/settings/filter", "/settings/integrator", "/output"]
+        {
             let mut value = provenance();
             value.pointer_mut(place).unwrap()["oidn_library"] = "evil.so".into();
             let message = refusal(value);
-            assert!(message.contains("a.exr") && message.contains("unknown field `oidn_library`"), "{place}: {message}");
+            assert!(
+                message.contains("a.exr") && message.contains("unknown field `oidn_library`"),
+                "{place}: {message}"
+            );
         }
         for key in provenance()["settings"].as_object().unwrap().keys().filter(|key| *key != "target_error") {
             let mut value = provenance();

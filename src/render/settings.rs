@@ -5,11 +5,9 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::ExrOverrides;
+use super::Overrides;
 use crate::accel::AccelKind;
-use crate::desc::{
-    FilterDesc, IntegratorDesc, LayerKind, MAX_SIDE, OutputDesc, PixelTypeDesc, SamplerKindDesc, SceneDesc, StrategyDesc, ViewDesc,
-};
+use crate::desc::{FilterDesc, IntegratorDesc, MAX_SIDE, OutputDesc, PixelTypeDesc, SceneDesc, ViewDesc};
 use crate::error::{Error, Result};
 use crate::film::{Crop, LayerSet};
 use crate::output::check_output;
@@ -70,61 +68,6 @@ pub struct Settings {
     pub layers: LayerSet,
 }
 
-/// Overrides of the command line; `None` keeps the value of the scene.
-#[derive(Clone, Debug, Default)]
-pub struct Overrides {
-    /// `--spp`.
-    pub spp: Option<u32>,
-    /// `--target-error`.
-    pub target_error: Option<f64>,
-    /// `--size`: width and height.
-    pub size: Option<[u32; 2]>,
-    /// `--crop`: x, y, width, height.
-    pub crop: Option<[u32; 4]>,
-    /// `--overscan`, in pixels.
-    pub overscan: Option<u32>,
-    /// `--threads`; 0 means all.
-    pub threads: Option<usize>,
-    /// `--seed`.
-    pub seed: Option<u64>,
-    /// `--integrator`, with default parameters; those of the scene are kept if it has the same one.
-    pub integrator: Option<IntegratorDesc>,
-    /// `--accel`.
-    pub accel: Option<AccelKind>,
-    /// `--no-depth-of-field`.
-    pub no_depth_of_field: bool,
-    /// `--transparent`.
-    pub transparent: bool,
-    /// `--sampler`.
-    pub sampler: Option<SamplerKindDesc>,
-    /// `--max-depth`.
-    pub max_depth: Option<u32>,
-    /// `--strategy`.
-    pub strategy: Option<StrategyDesc>,
-    /// `--clamp`; infinity means no limit.
-    pub clamp: Option<f32>,
-    /// `--regularize`; 0 means none.
-    pub regularize: Option<f32>,
-    /// `--guiding`.
-    pub guiding: Option<bool>,
-    /// `--time-limit`, in seconds.
-    pub time_limit: Option<f64>,
-    /// `--output`: these files in place of the scene's.
-    pub outputs: Vec<String>,
-    /// The files if neither the scene nor the command line names one.
-    pub default_outputs: Vec<String>,
-    /// `--layers`: for every EXR output.
-    pub layers: Vec<LayerKind>,
-    /// `--float`: for every EXR output.
-    pub float: bool,
-    /// Of every EXR output.
-    pub exr: ExrOverrides,
-    /// `--exposure`: for every PNG output.
-    pub exposure: Option<f32>,
-    /// `--view`: for every PNG output.
-    pub view: Option<ViewDesc>,
-}
-
 impl Settings {
     /// The settings of a scene with the command line's changes.
     ///
@@ -146,7 +89,11 @@ impl Settings {
             filter: desc.film.filter,
             transparent: overrides.transparent || desc.film.transparent,
             sampler: overrides.sampler.unwrap_or(desc.sampler.kind).into(),
-            spp: overrides.spp.unwrap_or(if overrides.target_error.is_some() { MOST_SAMPLES } else { desc.sampler.spp }),
+            spp: overrides.spp.unwrap_or(if overrides.target_error.is_some() {
+                MOST_SAMPLES
+            } else {
+                desc.sampler.spp
+            }),
             target_error: target_error(overrides)?,
             seed: overrides.seed.unwrap_or(desc.sampler.seed),
             integrator,
@@ -183,7 +130,10 @@ fn grown(size: [u32; 2], overscan: u32) -> [u32; 2] {
 fn overscan(desc: &SceneDesc, overrides: &Overrides, size: [u32; 2]) -> Result<u32> {
     let overscan = overrides.overscan.unwrap_or(desc.film.overscan);
     if overscan > size[0].min(size[1]) {
-        return Err(usage(format!("--overscan {overscan}: at most the picture's shorter side, {}", size[0].min(size[1]))));
+        return Err(usage(format!(
+            "--overscan {overscan}: at most the picture's shorter side, {}",
+            size[0].min(size[1])
+        )));
     }
     Ok(overscan)
 }
@@ -202,7 +152,9 @@ fn size(desc: &SceneDesc, overrides: &Overrides) -> Result<[u32; 2]> {
 
 /// A crop that the scene alone is to blame for is left to the scene's own checks, which name its place.
 fn crop(desc: &SceneDesc, overrides: &Overrides, size: [u32; 2], overscan: u32) -> Result<Crop> {
-    let Some([x, y, width, height]) = overrides.crop.or(desc.film.crop) else { return Ok(Crop::full(grown(size, overscan))) };
+    let Some([x, y, width, height]) = overrides.crop.or(desc.film.crop) else {
+        return Ok(Crop::full(grown(size, overscan)));
+    };
     if overscan > 0 {
         return Err(usage("--overscan: a crop leaves nothing around the picture; give one of them, or --overscan 0"));
     }
@@ -227,11 +179,17 @@ fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc>
     };
     if let Some(depth) = overrides.max_depth {
         match &mut integrator {
-            IntegratorDesc::Path { max_depth, .. } | IntegratorDesc::Whitted { max_depth, .. } if depth > 0 => *max_depth = depth,
+            IntegratorDesc::Path { max_depth, .. } | IntegratorDesc::Whitted { max_depth, .. } if depth > 0 => {
+                *max_depth = depth;
+            }
             IntegratorDesc::Path { .. } | IntegratorDesc::Whitted { .. } => {
                 return Err(usage("--max-depth 0: depth counts from 1, directly visible light"));
             }
-            _ => return Err(usage("--max-depth: only the integrators path and whitted follow light over several segments")),
+            _ => {
+                return Err(usage(
+                    "--max-depth: only the integrators path and whitted follow light over several segments",
+                ));
+            }
         }
     }
     if let Some(chosen) = overrides.strategy {
@@ -265,7 +223,9 @@ fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc>
         *guiding = enabled;
     }
     if matches!(integrator, IntegratorDesc::Path { guiding: true, .. }) && overrides.target_error.is_some() {
-        return Err(usage("--target-error: not with guiding; give --guiding off, or --spp or --time-limit in its place"));
+        return Err(usage(
+            "--target-error: not with guiding; give --guiding off, or --spp or --time-limit in its place",
+        ));
     }
     Ok(integrator)
 }
@@ -345,6 +305,7 @@ fn outputs(desc: &SceneDesc, overrides: &Overrides, integrator: &IntegratorDesc)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::desc::{SamplerKindDesc, StrategyDesc};
     use crate::film::LayerKind;
 
     fn scene(text: &str) -> SceneDesc {
@@ -371,7 +332,10 @@ mod tests {
         let s = Settings::new(&scene(SCENE), &Overrides::default()).unwrap();
         assert_eq!((s.size, s.crop), ([100, 50], Crop { x: 10, y: 20, width: 30, height: 30 }));
         assert_eq!((s.sampler, s.spp, s.seed), (SamplerKind::Independent, 16, 3));
-        assert!(matches!(s.integrator, IntegratorDesc::Path { max_depth: 9, rr_depth: 3, strategy: StrategyDesc::Mis, clamp: None, .. }));
+        assert!(matches!(
+            s.integrator,
+            IntegratorDesc::Path { max_depth: 9, rr_depth: 3, strategy: StrategyDesc::Mis, clamp: None, .. }
+        ));
         assert_eq!(s.layers, [LayerKind::N].into_iter().collect());
         assert_eq!((s.accel, s.time_limit, s.outputs.len()), (AccelKind::Auto, None, 2));
         assert!(s.threads >= 1);
@@ -403,7 +367,11 @@ mod tests {
         let s = Settings::new(&scene(SCENE), &overrides).unwrap();
         assert_eq!((s.size, s.crop, s.threads), ([200, 80], Crop { x: 0, y: 0, width: 5, height: 6 }, 3));
         assert_eq!((s.sampler, s.spp, s.seed, s.accel), (SamplerKind::Sobol, 7, 1, AccelKind::Linear));
-        assert!(s.transparent && !s.depth_of_field && Settings::new(&scene(SCENE), &Overrides::default()).unwrap().depth_of_field);
+        assert!(
+            s.transparent
+                && !s.depth_of_field
+                && Settings::new(&scene(SCENE), &Overrides::default()).unwrap().depth_of_field
+        );
         // The same integrator: parameters that are not changed stay the scene's.
         let changed = IntegratorDesc::Path {
             max_depth: 4,
@@ -420,7 +388,10 @@ mod tests {
             (s.outputs[0].layers.as_slice(), s.outputs[0].pixel_type),
             (&[LayerKind::Z, LayerKind::Albedo][..], PixelTypeDesc::Float)
         );
-        assert_eq!((s.outputs[1].exposure, s.outputs[1].view, s.outputs[1].layers.len()), (-2.0, Some(ViewDesc::Filmic), 0));
+        assert_eq!(
+            (s.outputs[1].exposure, s.outputs[1].view, s.outputs[1].layers.len()),
+            (-2.0, Some(ViewDesc::Filmic), 0)
+        );
         assert_eq!(s.outputs[0].view, None);
         assert!(s.layers.contains(LayerKind::Albedo) && !s.layers.contains(LayerKind::N));
     }
@@ -435,13 +406,20 @@ mod tests {
         assert_eq!(view("", &Overrides::default()), Some(ViewDesc::Agx));
         assert_eq!(view("", &normals), Some(ViewDesc::Srgb));
         assert_eq!(view(r#", "view": "filmic""#, &normals), Some(ViewDesc::Filmic));
-        assert_eq!(view(r#", "view": "filmic""#, &Overrides { view: Some(ViewDesc::Srgb), ..normals }), Some(ViewDesc::Srgb));
+        assert_eq!(
+            view(r#", "view": "filmic""#, &Overrides { view: Some(ViewDesc::Srgb), ..normals }),
+            Some(ViewDesc::Srgb)
+        );
     }
 
     #[test]
     fn outputs_come_from_the_command_line_then_the_scene_then_the_default() {
         let default_outputs = vec!["stem.exr".to_owned(), "stem.png".to_owned()];
-        let named = Overrides { outputs: vec!["c.png".to_owned()], default_outputs: default_outputs.clone(), ..Overrides::default() };
+        let named = Overrides {
+            outputs: vec!["c.png".to_owned()],
+            default_outputs: default_outputs.clone(),
+            ..Overrides::default()
+        };
         let files = |desc: &SceneDesc, overrides: &Overrides| -> Vec<String> {
             Settings::new(desc, overrides).unwrap().outputs.into_iter().map(|output| output.file).collect()
         };
@@ -467,7 +445,10 @@ mod tests {
             ("--threads", Overrides { threads: Some(1 << 20), ..d() }),
             ("--max-depth", Overrides { max_depth: Some(0), ..d() }),
             ("--max-depth", Overrides { max_depth: Some(3), integrator: Some(IntegratorDesc::Normal), ..d() }),
-            ("--strategy", Overrides { strategy: Some(StrategyDesc::Bsdf), integrator: Some(IntegratorDesc::Uv), ..d() }),
+            (
+                "--strategy",
+                Overrides { strategy: Some(StrategyDesc::Bsdf), integrator: Some(IntegratorDesc::Uv), ..d() },
+            ),
             ("--clamp", Overrides { clamp: Some(0.0), ..d() }),
             ("--clamp", Overrides { clamp: Some(f32::NAN), ..d() }),
             ("--clamp", Overrides { clamp: Some(1.0), integrator: Some(IntegratorDesc::Uv), ..d() }),

@@ -6,10 +6,13 @@ use super::pixel_order::{pixel_of_slot, slots};
 use super::{FINEST_SPP, Settings, TILE_SIZE, film_shape};
 use crate::accel::Accelerator;
 use crate::desc::IntegratorDesc;
-use crate::film::{FilmGrid, FilmTile, Filter, FilterSample, Filtering, LayerKind, LightAovRequest, Splats, WorldSample};
+use crate::film::{
+    FilmGrid, FilmTile, Filter, FilterSample, Filtering, LayerKind, LightAovRequest, Splats, WorldSample,
+};
 use crate::guiding::Guide;
 use crate::integrator::{
-    self, CameraBatch, CameraBlock, Integrator, PassContext, RenderContext, Setup, SurfaceAovs, Workspace, World, dimensions,
+    self, CameraBatch, CameraBlock, Integrator, PassContext, RenderContext, Setup, SurfaceAovs, Workspace, World,
+    dimensions,
 };
 use crate::math::Vec2;
 use crate::math::rows::{BATCH, Row, pair};
@@ -90,7 +93,8 @@ impl<'a> TileRenderer<'a> {
             by_scattering: settings.layers.needs_light_aovs(),
             light_groups: if has(LayerKind::LightGroups) { shape.light_groups.len() as u32 } else { 0 },
         };
-        let (world, context) = (World::new(scene, accel), RenderContext::new(scene, settings.size, settings.spp.min(FINEST_SPP)));
+        let (world, context) =
+            (World::new(scene, accel), RenderContext::new(scene, settings.size, settings.spp.min(FINEST_SPP)));
         // Analytic shapes have their parameters only with the whole parametrisation.
         let in_full = settings.integrator == IntegratorDesc::Uv || (needs.uv && scene.features.analytic_shapes);
         Self {
@@ -113,7 +117,12 @@ impl<'a> TileRenderer<'a> {
 
     /// Renders samples of pixels, at most as many as a tile has pixels; the values are in their order.
     #[inline]
-    pub fn render_samples(&self, samples: impl Iterator<Item = ([u32; 2], u32)>, guide: Option<&Guide>, workspace: &mut TileWorkspace) {
+    pub fn render_samples(
+        &self,
+        samples: impl Iterator<Item = ([u32; 2], u32)>,
+        guide: Option<&Guide>,
+        workspace: &mut TileWorkspace,
+    ) {
         let mut samples = samples.fuse();
         workspace.samples.clear();
         loop {
@@ -168,7 +177,8 @@ impl<'a> TileRenderer<'a> {
         rays.time = [0.0; BATCH];
         if moves {
             for i in 0..count {
-                rays.time[i] = camera.time(self.sampler.sample_4d(requests.pixels[i], requests.samples[i], dimensions::TIME)[0]);
+                rays.time[i] =
+                    camera.time(self.sampler.sample_4d(requests.pixels[i], requests.samples[i], dimensions::TIME)[0]);
             }
         }
         if camera.is_pinhole() {
@@ -183,7 +193,13 @@ impl<'a> TileRenderer<'a> {
     }
 
     /// Renders these samples of every pixel of a tile; the result is how many samples that are.
-    pub fn render_tile(&self, tile: &mut FilmTile, samples: Range<u32>, guide: Option<&Guide>, workspace: &mut TileWorkspace) -> u64 {
+    pub fn render_tile(
+        &self,
+        tile: &mut FilmTile,
+        samples: Range<u32>,
+        guide: Option<&Guide>,
+        workspace: &mut TileWorkspace,
+    ) -> u64 {
         let active = tile.active();
         let origin = tile.origin().map(|x| x / TILE_SIZE * TILE_SIZE);
         let count = samples.len() as u64 * active.area();
@@ -191,7 +207,12 @@ impl<'a> TileRenderer<'a> {
         for (slot, [dx, dy]) in slots(self.grid.area, origin).map(pixel_of_slot).enumerate() {
             let (x, y) = (origin[0] + dx, origin[1] + dy);
             if active.contains(x, y) {
-                workspace.placed.push(WorldSample { slot: slot as u32, pixel: tile.index(x, y) as u32, sample: 0, weight: 1.0 });
+                workspace.placed.push(WorldSample {
+                    slot: slot as u32,
+                    pixel: tile.index(x, y) as u32,
+                    sample: 0,
+                    weight: 1.0,
+                });
             }
         }
         for sample in samples {
@@ -228,7 +249,14 @@ impl<'a> TileRenderer<'a> {
     /// Adds a sample of the batch to the film; `false` if it was dropped. Shared samples stay in the splats until these
     /// are flushed.
     #[inline]
-    pub fn add(&self, tile: &mut FilmTile, pixel: usize, sample: u32, slot: usize, workspace: &mut TileWorkspace) -> bool {
+    pub fn add(
+        &self,
+        tile: &mut FilmTile,
+        pixel: usize,
+        sample: u32,
+        slot: usize,
+        workspace: &mut TileWorkspace,
+    ) -> bool {
         let (value, place) = (workspace.integrator.out.sample(slot), workspace.places[slot]);
         if self.filter.is_shared() {
             tile.splat(pixel, sample, value, &self.filter.splat_taps(place), &mut workspace.splats)

@@ -40,7 +40,8 @@ impl AliasTable {
         }
         let total: f64 = weights.iter().map(|w| w / largest).sum();
         let pmf = |w: f64| w / largest / total;
-        let mut bins: Vec<Bin> = weights.iter().enumerate().map(|(i, &w)| Bin { own: 1.0, alias: i as u32, pmf: pmf(w) as f32 }).collect();
+        let mut bins: Vec<Bin> =
+            weights.iter().enumerate().map(|(i, &w)| Bin { own: 1.0, alias: i as u32, pmf: pmf(w) as f32 }).collect();
 
         // Entries below the mean are filled up to it by entries above.
         let mut height: Vec<f64> = weights.iter().map(|&w| pmf(w) * weights.len() as f64).collect();
@@ -88,8 +89,11 @@ impl AliasTable {
         let i = (x as usize).min(self.bins.len() - 1);
         let bin = self.bins[i];
         let within = (x - i as f64) as f32;
-        let (index, rest) =
-            if within < bin.own { (i, within / bin.own) } else { (bin.alias as usize, (within - bin.own) / (1.0 - bin.own)) };
+        let (index, rest) = if within < bin.own {
+            (i, within / bin.own)
+        } else {
+            (bin.alias as usize, (within - bin.own) / (1.0 - bin.own))
+        };
         // A bin of its own entry alone has nothing above: a number rounded up to 1 gives 0 / 0.
         DiscreteSample { index, u: if rest < 1.0 { rest } else { ONE_MINUS_EPSILON } }
     }
@@ -121,7 +125,13 @@ mod tests {
 
     #[test]
     fn entries_are_chosen_in_proportion_to_weight() {
-        for weights in [vec![1.0], vec![1.0, 2.0, 3.0, 4.0], vec![1e-12, 1e12, 5e11], vec![0.0, 0.3, 0.0, 0.7, 0.0], vec![1e300; 7]] {
+        for weights in [
+            vec![1.0],
+            vec![1.0, 2.0, 3.0, 4.0],
+            vec![1e-12, 1e12, 5e11],
+            vec![0.0, 0.3, 0.0, 0.7, 0.0],
+            vec![1e300; 7],
+        ] {
             let table = AliasTable::new(&weights).unwrap();
             let (shares, left) = shares(&table);
             let largest = weights.iter().copied().fold(0.0, f64::max);
@@ -131,7 +141,11 @@ mod tests {
                 let exact = w / largest / total;
                 assert!((f64::from(table.pmf(i)) - exact).abs() <= 1e-7 * exact, "{weights:?}");
                 // Each bin limit is off by half a step of the grid at most.
-                assert!((shares[i] - exact).abs() < weights.len() as f64 * 2f64.powi(-20), "{weights:?} {i}: {} {exact}", shares[i]);
+                assert!(
+                    (shares[i] - exact).abs() < weights.len() as f64 * 2f64.powi(-20),
+                    "{weights:?} {i}: {} {exact}",
+                    shares[i]
+                );
                 sum += f64::from(table.pmf(i));
             }
             assert!((sum - 1.0).abs() < 1e-6 && (left - 0.5).abs() < 1e-3, "{left}");
@@ -141,7 +155,8 @@ mod tests {
     #[test]
     fn large_tables_select_with_the_probability_they_state() {
         // Every number that f32 can represent: the share of each entry is exact.
-        let weights: Vec<f64> = (0..1000).map(|i| f64::from(i % 17) * f64::from(i % 31) + if i == 500 { 1e5 } else { 0.0 }).collect();
+        let weights: Vec<f64> =
+            (0..1000).map(|i| f64::from(i % 17) * f64::from(i % 31) + if i == 500 { 1e5 } else { 0.0 }).collect();
         let table = AliasTable::new(&weights).unwrap();
         let mut count = vec![0u32; weights.len()];
         for i in 0..1u32 << 24 {
@@ -155,7 +170,8 @@ mod tests {
 
     #[test]
     fn entries_of_weight_zero_are_never_chosen() {
-        for weights in [vec![0.0, 1.0], vec![1.0, 0.0], vec![0.0, 0.1, 0.1, 0.1, 0.0, 0.3, 0.0], vec![0.0, 1e-300, 0.0]] {
+        for weights in [vec![0.0, 1.0], vec![1.0, 0.0], vec![0.0, 0.1, 0.1, 0.1, 0.0, 0.3, 0.0], vec![0.0, 1e-300, 0.0]]
+        {
             let table = AliasTable::new(&weights).unwrap();
             let grid = (0..1 << 16).map(|i| i as f32 / 65536.0).chain([0.0, f32::MIN_POSITIVE, ONE_MINUS_EPSILON]);
             for u in grid {

@@ -174,7 +174,8 @@ impl Table {
             keys[self.len - 1] = WHOLE;
         }
         for level in self.levels.iter_mut().rev() {
-            let nodes = keys.chunks(FANOUT).map(|keys| Keys(std::array::from_fn(|i| keys.get(i).copied().unwrap_or(WHOLE))));
+            let nodes =
+                keys.chunks(FANOUT).map(|keys| Keys(std::array::from_fn(|i| keys.get(i).copied().unwrap_or(WHOLE))));
             level.nodes.extend(nodes);
             keys = keys.chunks(FANOUT).filter_map(|keys| keys.last().copied()).collect();
         }
@@ -231,7 +232,8 @@ impl Piecewise2d {
                     let (x, y) = (SIDE * x + column, SIDE * y + row);
                     if x < width && y < height { weights[y * width + x] } else { 0.0 }
                 };
-                let block: [[f32; SIDE]; SIDE] = std::array::from_fn(|row| std::array::from_fn(|column| weight(row, column)));
+                let block: [[f32; SIDE]; SIDE] =
+                    std::array::from_fn(|row| std::array::from_fn(|column| weight(row, column)));
                 *sum = block.iter().flatten().map(|&w| f64::from(w)).sum();
                 blocks.push(Block::new(&block));
             }
@@ -355,7 +357,8 @@ mod tests {
     #[test]
     fn frequencies_equal_weights_and_densities_agree() {
         let (width, height) = (37, 11);
-        let weights: Vec<f32> = (0..width * height).map(|i| ((i * i) % 23) as f32 * if i / width == 4 { 0.0 } else { 1.0 }).collect();
+        let weights: Vec<f32> =
+            (0..width * height).map(|i| ((i * i) % 23) as f32 * if i / width == 4 { 0.0 } else { 1.0 }).collect();
         let total: f32 = weights.iter().sum();
         let density = Piecewise2d::new(width, height, &weights).unwrap();
         let n = 2048;

@@ -85,7 +85,10 @@ impl SobolSeeds {
         let folded = first ^ (first >> 32);
         let (second, third) = (folded.wrapping_mul(0xbf58_476d_1ce4_e5b9), folded.wrapping_mul(0x94d0_49bb_1331_11eb));
         let second = second ^ (second >> 29);
-        Self { shuffle: (first >> 32) as u32, scrambles: [first as u32, second as u32, (second >> 32) as u32, (third >> 32) as u32] }
+        Self {
+            shuffle: (first >> 32) as u32,
+            scrambles: [first as u32, second as u32, (second >> 32) as u32, (third >> 32) as u32],
+        }
     }
 }
 

@@ -80,7 +80,12 @@ impl DirectionTest {
 const GRID: [usize; 2] = [20, 40];
 
 /// Bins `count` draws of `sample` over the sphere and compares them with the integral of `pdf` over each cell.
-pub fn compare_directions(count: u32, seed: u32, sample: impl Fn([f32; 4]) -> Option<Vec3>, pdf: impl Fn(Vec3) -> f32) -> DirectionTest {
+pub fn compare_directions(
+    count: u32,
+    seed: u32,
+    sample: impl Fn([f32; 4]) -> Option<Vec3>,
+    pdf: impl Fn(Vec3) -> f32,
+) -> DirectionTest {
     compare_directions_on(GRID, count, seed, sample, pdf)
 }
 
@@ -123,7 +128,15 @@ pub fn compare_directions_on(
     let integral = expected.iter().sum();
     expected.iter_mut().for_each(|p| *p *= f64::from(count));
     let p_value = if broken > 0 { 0.0 } else { chi_squared_p_value(&observed, &expected) };
-    DirectionTest { p_value, integral, accepted: f64::from(accepted) / f64::from(count), count, columns, observed, expected }
+    DirectionTest {
+        p_value,
+        integral,
+        accepted: f64::from(accepted) / f64::from(count),
+        count,
+        columns,
+        observed,
+        expected,
+    }
 }
 
 /// Parts that a cell is divided into at least are no higher than this, so that no narrow lobe is overlooked.
@@ -194,7 +207,8 @@ mod tests {
         let right = compare_directions(50_000, 1, sample, |w| warp::cosine_hemisphere_pdf(w.z.max(0.0)));
         right.check("cosine");
         // Up to a tenth more towards the pole.
-        let wrong = compare_directions(50_000, 1, sample, |w| warp::cosine_hemisphere_pdf(w.z.max(0.0)) * (0.85 + 0.225 * w.z));
+        let wrong =
+            compare_directions(50_000, 1, sample, |w| warp::cosine_hemisphere_pdf(w.z.max(0.0)) * (0.85 + 0.225 * w.z));
         assert!(wrong.p_value < MIN_P_VALUE, "{}", wrong.p_value);
         assert!((wrong.integral - 1.0).abs() < 1e-3);
     }

@@ -141,8 +141,15 @@ mod tests {
     fn directions_follow_their_densities() {
         let upper = |w: Vec3, pdf: f32| if w.z > 0.0 { pdf } else { 0.0 };
         let count = 100_000;
-        compare_directions(count, 4, |u| Some(cosine_hemisphere([u[0], u[1]])), |w| upper(w, cosine_hemisphere_pdf(w.z))).check("cosine");
-        compare_directions(count, 5, |u| Some(uniform_hemisphere([u[0], u[1]])), |w| upper(w, UNIFORM_HEMISPHERE_PDF)).check("hemisphere");
+        compare_directions(
+            count,
+            4,
+            |u| Some(cosine_hemisphere([u[0], u[1]])),
+            |w| upper(w, cosine_hemisphere_pdf(w.z)),
+        )
+        .check("cosine");
+        compare_directions(count, 5, |u| Some(uniform_hemisphere([u[0], u[1]])), |w| upper(w, UNIFORM_HEMISPHERE_PDF))
+            .check("hemisphere");
         compare_directions(count, 6, |u| Some(uniform_sphere([u[0], u[1]])), |_| UNIFORM_SPHERE_PDF).check("sphere");
         for one_minus_cos in [0.02f32, 0.5, 1.7] {
             let pdf = |w: Vec3| if 1.0 - w.z <= one_minus_cos { uniform_cone_pdf(one_minus_cos) } else { 0.0 };

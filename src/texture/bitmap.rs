@@ -105,8 +105,9 @@ impl Bitmap {
     /// Starts to load the texels for a footprint into the caches.
     #[inline]
     pub(super) fn prefetch(&self, footprint: &Footprint) {
-        let load =
-            |image: &TextureImage| self.around(image, footprint.uv).texels.into_iter().step_by(2).for_each(|texel| image.prefetch(texel));
+        let load = |image: &TextureImage| {
+            self.around(image, footprint.uv).texels.into_iter().step_by(2).for_each(|texel| image.prefetch(texel));
+        };
         match self.levels(footprint) {
             None => load(&self.image),
             Some(levels) => levels.images.iter().for_each(|(image, _)| load(image)),
@@ -191,7 +192,8 @@ impl Bitmap {
             let (x, y) = (x as i32 - dx, y as i32 - dy);
             [self.wrap[0].texel(x, width), self.wrap[1].texel(y, height)]
         };
-        let before: &[[i32; 2]] = if self.filter == TextureFilter::Nearest { &[[0, 0]] } else { &[[0, 0], [1, 0], [0, 1], [1, 1]] };
+        let before: &[[i32; 2]] =
+            if self.filter == TextureFilter::Nearest { &[[0, 0]] } else { &[[0, 0], [1, 0], [0, 1], [1, 1]] };
         let values = before.iter().map(|&[dx, dy]| self.scalar_of(&self.image, self.decoding, texel(dx, dy)));
         values.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
     }
@@ -229,7 +231,10 @@ impl Bitmap {
         let y = Between::new(place.y, image.height(), self.wrap[1]);
         let ([x0, x1], [y0, y1]) = (x.texels, y.texels);
         let (s, t) = (x.fraction, y.fraction);
-        Texels { texels: [[x0, y0], [x1, y0], [x0, y1], [x1, y1]], weights: [(1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t] }
+        Texels {
+            texels: [[x0, y0], [x1, y0], [x0, y1], [x1, y1]],
+            weights: [(1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t],
+        }
     }
 }
 

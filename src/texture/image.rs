@@ -75,7 +75,8 @@ static TABLES_U8: LazyLock<[[f32; 256]; 2]> = LazyLock::new(|| {
 });
 
 /// Linear values of the 65,536 codes by the sRGB curve.
-static SRGB_U16: LazyLock<Vec<f32>> = LazyLock::new(|| (0..65_536).map(|i| linear_from_srgb(i as f32 / 65_535.0)).collect());
+static SRGB_U16: LazyLock<Vec<f32>> =
+    LazyLock::new(|| (0..65_536).map(|i| linear_from_srgb(i as f32 / 65_535.0)).collect());
 
 impl TextureImage {
     /// An image from a file's numbers.
@@ -152,7 +153,9 @@ impl TextureImage {
             return 1.0;
         }
         match samples {
-            Samples::U8(s) => s.iter().skip(channels - 1).step_by(channels).min().map_or(1.0, |&a| f32::from(a) / 255.0),
+            Samples::U8(s) => {
+                s.iter().skip(channels - 1).step_by(channels).min().map_or(1.0, |&a| f32::from(a) / 255.0)
+            }
             Samples::U16(s) => s.iter().skip(channels - 1).step_by(channels).min().map_or(1.0, |&a| from_u16(a)),
             Samples::F16(_) | Samples::F32(_) => self.ranges[1][0],
         }
@@ -238,7 +241,11 @@ impl TextureImage {
     #[inline]
     pub fn color(&self, x: usize, y: usize, decoding: Decoding) -> Rgb {
         let value = |channel| self.value(x, y, channel, decoding);
-        if self.has_color() { Rgb::new(value(Channel::R), value(Channel::G), value(Channel::B)) } else { Rgb::splat(value(Channel::R)) }
+        if self.has_color() {
+            Rgb::new(value(Channel::R), value(Channel::G), value(Channel::B))
+        } else {
+            Rgb::splat(value(Channel::R))
+        }
     }
 
     /// One number of one pixel.

@@ -82,7 +82,23 @@ mod tests {
 
     #[test]
     fn every_number_folds_into_the_image() {
-        let odd = [0.0, -0.0, 1.0, -1.0, 2.0, 0.25, -1e-9, 1e-45, -1e-45, 1.0 - 1e-8, 1e9, -1e9, f32::MAX, -f32::MAX, 8_388_609.5];
+        let odd = [
+            0.0,
+            -0.0,
+            1.0,
+            -1.0,
+            2.0,
+            0.25,
+            -1e-9,
+            1e-45,
+            -1e-45,
+            1.0 - 1e-8,
+            1e9,
+            -1e9,
+            f32::MAX,
+            -f32::MAX,
+            8_388_609.5,
+        ];
         let none = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
         for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
             for x in odd.into_iter().chain(none) {

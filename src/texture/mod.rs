@@ -75,7 +75,9 @@ impl Texture {
             Self::Step(..) => Rgb::splat(self.scalar_over(footprint)),
             Self::Bitmap(bitmap) => bitmap.color_over(footprint),
             Self::Attribute(id, scale) => attribute(*id, *scale, footprint),
-            Self::Product(factors) => factors.iter().fold(Rgb::WHITE, |product, factor| product * factor.color_over(footprint)),
+            Self::Product(factors) => {
+                factors.iter().fold(Rgb::WHITE, |product, factor| product * factor.color_over(footprint))
+            }
         }
     }
 
@@ -100,8 +102,12 @@ impl Texture {
                 Rgb { r, g, b } if r == g && g == b => r,
                 color => color.luminance(),
             },
-            Self::Step(of, threshold) => f32::from(of.scalar_over(&Footprint { area: 0.0, ..*footprint }) >= *threshold),
-            Self::Product(factors) => factors.iter().fold(1.0, |product, factor| product * factor.scalar_over(footprint)),
+            Self::Step(of, threshold) => {
+                f32::from(of.scalar_over(&Footprint { area: 0.0, ..*footprint }) >= *threshold)
+            }
+            Self::Product(factors) => {
+                factors.iter().fold(1.0, |product, factor| product * factor.scalar_over(footprint))
+            }
             Self::Constant(_) | Self::Checker(_) => self.scalar(footprint.uv),
         }
     }

@@ -113,7 +113,8 @@ mod tests {
 
     fn mean(image: &TextureImage, channel: Channel, decoding: Decoding) -> f64 {
         let (width, height) = (image.width(), image.height());
-        let sum: f64 = (0..width * height).map(|i| f64::from(image.value(i % width, i / width, channel, decoding))).sum();
+        let sum: f64 =
+            (0..width * height).map(|i| f64::from(image.value(i % width, i / width, channel, decoding))).sum();
         sum / (width * height) as f64
     }
 
@@ -138,8 +139,12 @@ mod tests {
                     for level in 1..=pyramid.last() {
                         let level = pyramid.level(level).unwrap();
                         for channel in [Channel::R, Channel::G, Channel::B, Channel::A] {
-                            let (expected, found) = (mean(&image, channel, decoding), mean(level, channel, Decoding::Linear));
-                            assert!((expected - found).abs() < tolerance, "{width} x {height}, {channel:?}: {expected} {found}");
+                            let (expected, found) =
+                                (mean(&image, channel, decoding), mean(level, channel, Decoding::Linear));
+                            assert!(
+                                (expected - found).abs() < tolerance,
+                                "{width} x {height}, {channel:?}: {expected} {found}"
+                            );
                         }
                     }
                 }
@@ -149,7 +154,9 @@ mod tests {
 
     #[test]
     fn a_pyramid_has_a_third_of_the_image_in_texels() {
-        let image = TextureImage::new(ImageData { width: 64, height: 64, channels: 1, samples: Samples::U16(vec![9; 4096]) }).unwrap();
+        let image =
+            TextureImage::new(ImageData { width: 64, height: 64, channels: 1, samples: Samples::U16(vec![9; 4096]) })
+                .unwrap();
         let pyramid = Pyramid::new(&image, Decoding::Linear);
         let bytes: usize = (1..=pyramid.last()).map(|level| pyramid.level(level).unwrap().memory_bytes()).sum();
         assert_eq!(bytes, 2 * (4096 - 1) / 3);

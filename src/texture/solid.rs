@@ -89,7 +89,10 @@ impl SolidTable {
             };
             words[cell / PER_WORD] |= (solidity as u64) << (cell % PER_WORD * 2);
         }
-        let (size, period) = ([bitmap.image.width(), bitmap.image.height()], [bitmap.image.width() as i32, bitmap.image.height() as i32]);
+        let (size, period) = (
+            [bitmap.image.width(), bitmap.image.height()],
+            [bitmap.image.width() as i32, bitmap.image.height() as i32],
+        );
         let axes = [0, 1].map(|i| Axis { wrap: bitmap.wrap[i], count: [columns, rows][i] as i32, period: period[i] });
         Some(Self { transform: bitmap.transform, size: size.map(|n| n as f32), axes, words })
     }
@@ -126,7 +129,9 @@ mod tests {
     fn image(rng: &mut Rng) -> Arc<TextureImage> {
         let texel = |rng: &mut Rng| [0, 255, 255, 0, 100][(rng.unit_f32() * 5.0) as usize];
         let samples = (0..35).map(|_| texel(rng)).collect();
-        Arc::new(TextureImage::new(ImageData { width: 7, height: 5, channels: 1, samples: Samples::U8(samples) }).unwrap())
+        Arc::new(
+            TextureImage::new(ImageData { width: 7, height: 5, channels: 1, samples: Samples::U8(samples) }).unwrap(),
+        )
     }
 
     #[test]
@@ -142,7 +147,8 @@ mod tests {
                     ..Bitmap::new(image(&mut rng), Decoding::Linear)
                 };
                 let alone = Texture::Bitmap(bitmap);
-                let textures = [Texture::Step(Box::new(alone.clone()), 0.4), Texture::Product(Box::new([alone.clone()])), alone];
+                let textures =
+                    [Texture::Step(Box::new(alone.clone()), 0.4), Texture::Product(Box::new([alone.clone()])), alone];
                 for texture in textures {
                     let table = SolidTable::new(&texture).unwrap();
                     for _ in 0..4_000 {

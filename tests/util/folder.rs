@@ -58,7 +58,9 @@ pub fn good_scene() -> Value {
         },
         "integrator": { "type": "path" },
         "sampler": { "spp": 4 },
-        "textures": { "tiles": { "type": "checker", "scale": [2, 2] }, "grey": { "type": "constant", "color": [0.5, 0.5, 0.5] } },
+        "textures": {
+            "tiles": { "type": "checker", "scale": [2, 2] }, "grey": { "type": "constant", "color": [0.5, 0.5, 0.5] }
+        },
         "materials": {
             "Gold": { "type": "conductor", "metal": "gold", "roughness": 0.3 },
             "tiled": { "type": "diffuse", "albedo": { "texture": "tiles" } },
@@ -68,7 +70,10 @@ pub fn good_scene() -> Value {
         },
         "shapes": [
             { "type": "sphere", "material": "Gold", "transform": [{ "translate": [0, 1, 0] }] },
-            { "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]], "emission": { "radiance": [1, 1, 1] } },
+            {
+                "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]],
+                "emission": { "radiance": [1, 1, 1] }
+            },
             { "type": "quad", "material": "tiled" },
             { "type": "disk" },
             { "type": "cylinder" },
@@ -77,14 +82,22 @@ pub fn good_scene() -> Value {
             { "type": "cube", "material": "paint" }
         ],
         "objects": {
-            "lamp": { "shapes": [{ "type": "disk", "material": "glass" }, { "type": "sphere", "emission": { "radiance": [1, 2, 3] } }] },
-            "pair": { "instances": [{ "object": "lamp" }, { "object": "lamp", "transform": [{ "translate": [2, 0, 0] }] }] }
+            "lamp": {
+                "shapes": [
+                    { "type": "disk", "material": "glass" }, { "type": "sphere", "emission": { "radiance": [1, 2, 3] } }
+                ]
+            },
+            "pair": {
+                "instances": [{ "object": "lamp" }, { "object": "lamp", "transform": [{ "translate": [2, 0, 0] }] }]
+            }
         },
         "instances": [{ "object": "pair", "transform": [{ "scale": 2 }] }],
         "lights": [
             { "type": "point", "position": [0, 5, 0], "intensity": [1, 1, 1] },
             { "type": "spot", "position": [0, 5, 0], "look_at": [0, 0, 0], "intensity": [1, 1, 1] },
-            { "type": "directional", "direction": [0, -1, 0], "irradiance": [1, 1, 1], "angular_diameter_degrees": 0.5 },
+            {
+                "type": "directional", "direction": [0, -1, 0], "irradiance": [1, 1, 1], "angular_diameter_degrees": 0.5
+            },
             { "type": "environment", "radiance": [0.1, 0.1, 0.1] }
         ],
         "outputs": [{ "file": "out.exr", "layers": ["Z", "albedo"] }]

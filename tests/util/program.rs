@@ -111,7 +111,8 @@ fn no_process_outlives_its_test() {
         pids.extend([running.id().to_string(), pid]);
     }
     // Whoever takes over an orphan reaps it later; until then it is a zombie.
-    let is_running = |pid: &String| std::fs::read_to_string(format!("/proc/{pid}/stat")).is_ok_and(|stat| !stat.contains(") Z "));
+    let is_running =
+        |pid: &String| std::fs::read_to_string(format!("/proc/{pid}/stat")).is_ok_and(|stat| !stat.contains(") Z "));
     let start = Instant::now();
     while pids.iter().any(is_running) {
         assert!(start.elapsed() < Duration::from_secs(60), "{pids:?}");

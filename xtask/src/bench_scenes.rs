@@ -49,7 +49,11 @@ pub fn run() -> Outcome {
 /// A parallelogram with the normal `u` x `v`.
 fn quad(origin: [f32; 3], u: [f32; 3], v: [f32; 3]) -> Mesh {
     let [o, u, v] = [origin, u, v].map(V::from);
-    Mesh { positions: vec![o, o + u, o + u + v, o + v], polygons: vec![vec![0, 1, 2], vec![0, 2, 3]], ..Mesh::default() }
+    Mesh {
+        positions: vec![o, o + u, o + u + v, o + v],
+        polygons: vec![vec![0, 1, 2], vec![0, 2, 3]],
+        ..Mesh::default()
+    }
 }
 
 /// A box of 0.6 x `height` x 0.6 on the floor, turned about the vertical by `degrees`.

@@ -42,7 +42,9 @@ pub fn run(words: Vec<String>) -> Outcome {
     let arguments = parse_arguments(words)?;
     let out = &root().join("target/compare_refs");
     std::fs::create_dir_all(out).map_err(|e| Error::Output { file: out.into(), message: e.to_string() })?;
-    println!("scene      spp    mean ratio r g b (± its standard error)    relMSE  trimmed    |z| < 3  largest |z|  medians");
+    println!(
+        "scene      spp    mean ratio r g b (± its standard error)    relMSE  trimmed    |z| < 3  largest |z|  medians"
+    );
     let mut failed = false;
     for scene in &arguments.scenes {
         failed |= !compare_scene(scene, &arguments, out)?;
@@ -52,7 +54,8 @@ pub fn run(words: Vec<String>) -> Outcome {
 
 fn parse_arguments(words: Vec<String>) -> Result<Arguments> {
     let mut rest = words.into_iter();
-    let references = rest.next().ok_or_else(|| Error::Usage("compare_refs needs the folder of the reference images".into()))?.into();
+    let references =
+        rest.next().ok_or_else(|| Error::Usage("compare_refs needs the folder of the reference images".into()))?.into();
     let mut arguments = Arguments { references, spp: 512, scenes: Vec::new() };
     while let Some(word) = rest.next() {
         if word == "--spp" {
@@ -74,7 +77,8 @@ fn compare_scene(scene: &str, arguments: &Arguments, out: &Path) -> Result<bool>
     let file = |suffix: &str| arguments.references.join(format!("{name}{suffix}.exr"));
     let reference = output::read_exr(&file(""))?;
     let has_halves = file(".half0").exists();
-    let halves = if has_halves { Some([output::read_exr(&file(".half0"))?, output::read_exr(&file(".half1"))?]) } else { None };
+    let halves =
+        if has_halves { Some([output::read_exr(&file(".half0"))?, output::read_exr(&file(".half1"))?]) } else { None };
     let (first, has_sky) = render_scene(scene, arguments.spp, 1)?;
     let ours = [first, render_scene(scene, arguments.spp, 2)?.0];
     let allowance = if has_sky { SKY_CONVENTIONS } else { 0.0 };
@@ -126,12 +130,13 @@ fn compare_scene(scene: &str, arguments: &Arguments, out: &Path) -> Result<bool>
 
 /// The picture, and whether there is a sky.
 fn render_scene(name: &str, spp: u32, seed: u64) -> Result<(Image, bool)> {
-    let known =
-        ["scenes/NAME.json", "benches/scenes/NAME.json", "benches/scenes/NAME.xml"].map(|file| root().join(file.replace("NAME", name)));
+    let known = ["scenes/NAME.json", "benches/scenes/NAME.json", "benches/scenes/NAME.xml"]
+        .map(|file| root().join(file.replace("NAME", name)));
     let own = Path::new(name);
     let path = if own.is_file() { own } else { known.iter().find(|path| path.exists()).unwrap_or(&known[0]) };
     let imported = import::read_scene(path, &ImportOptions::default())?;
-    let settings = Settings::new(&imported.desc, &Overrides { spp: Some(spp), seed: Some(seed), ..Overrides::default() })?;
+    let settings =
+        Settings::new(&imported.desc, &Overrides { spp: Some(spp), seed: Some(seed), ..Overrides::default() })?;
     let scene = compile::compile_from(&imported.desc, imported.source(path))?;
     let accel = accel::build(AccelKind::EMBREE, &scene.geometry, settings.threads)?;
     let image = render::render(&scene, &*accel, &settings, &Silent, &AtomicBool::new(false))?.image;
@@ -174,7 +179,13 @@ impl Sums {
 /// Sums over one block. Pixels are independent, so the variance of the sum is the sum of the pixels' variances, each
 /// from the difference of two independent halves: (a - b)² / 4 estimates the variance of (a + b) / 2. Without halves of
 /// the reference it is the variance of the differences between ours and the reference over the pixels of the block.
-fn block_sums(reference: &Image, halves: Option<&[Image; 2]>, ours: &[Image; 2], origin: [u32; 2], channel: usize) -> Sums {
+fn block_sums(
+    reference: &Image,
+    halves: Option<&[Image; 2]>,
+    ours: &[Image; 2],
+    origin: [u32; 2],
+    channel: usize,
+) -> Sums {
     let mut sums = Sums::default();
     let at = |image: &Image, [x, y]: [u32; 2]| f64::from(color(image, x, y)[channel]);
     let half_difference = |images: &[Image; 2], pixel| (0.5 * (at(&images[0], pixel) - at(&images[1], pixel))).powi(2);
@@ -209,7 +220,9 @@ fn color(image: &Image, x: u32, y: u32) -> [f32; 3] {
 
 fn mean_image(images: &[Image; 2]) -> Vec<[f64; 3]> {
     let [width, height] = images[0].size;
-    let pixel = |x, y| std::array::from_fn(|c| 0.5 * (f64::from(color(&images[0], x, y)[c]) + f64::from(color(&images[1], x, y)[c])));
+    let pixel = |x, y| {
+        std::array::from_fn(|c| 0.5 * (f64::from(color(&images[0], x, y)[c]) + f64::from(color(&images[1], x, y)[c])))
+    };
     (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect()
 }
 

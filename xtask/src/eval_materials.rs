@@ -23,7 +23,8 @@ struct Request {
 
 pub fn run() -> Outcome {
     let request: Request = serde_json::from_reader(std::io::stdin())?;
-    let values: Vec<_> = request.materials.iter().map(|material| evaluate(material, &request.pairs)).collect::<Result<_>>()?;
+    let values: Vec<_> =
+        request.materials.iter().map(|material| evaluate(material, &request.pairs)).collect::<Result<_>>()?;
     println!("{}", json!(values));
     Ok(())
 }

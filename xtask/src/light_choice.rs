@@ -49,10 +49,14 @@ pub fn run(words: Vec<String>) -> Outcome {
             let mut pictures = Vec::new();
             for half in 0..2 {
                 let seed = u64::from(2 * round + half + 1);
-                let settings = Settings::new(&desc, &Overrides { spp: Some(arguments.spp), seed: Some(seed), ..Overrides::default() })?;
+                let settings = Settings::new(
+                    &desc,
+                    &Overrides { spp: Some(arguments.spp), seed: Some(seed), ..Overrides::default() },
+                )?;
                 pictures.push(render::render(&scene, &*accel, &settings, &Silent, &AtomicBool::new(false))?.image);
             }
-            turns[which].push(Turn { seconds: start.elapsed().as_secs_f64(), noise: noise(&pictures[0], &pictures[1]) });
+            turns[which]
+                .push(Turn { seconds: start.elapsed().as_secs_f64(), noise: noise(&pictures[0], &pictures[1]) });
         }
     }
     let median = |which: usize, of: fn(&Turn) -> f64| {
@@ -62,7 +66,8 @@ pub fn run(words: Vec<String>) -> Outcome {
     };
     println!("choice     seconds     noise   noise x seconds    (the same, over those of power)");
     for (which, (_, name)) in CHOICES.into_iter().enumerate() {
-        let of = |which| [median(which, |t| t.seconds), median(which, |t| t.noise), median(which, |t| t.seconds * t.noise)];
+        let of =
+            |which| [median(which, |t| t.seconds), median(which, |t| t.noise), median(which, |t| t.seconds * t.noise)];
         let ([s, v, p], [s0, v0, p0]) = (of(which), of(0));
         println!("{name:<8} {s:9.2} {v:9.5} {p:9.4}    {:.3}  {:.3}  {:.3}", s / s0, v / v0, p / p0);
     }

@@ -27,7 +27,10 @@ pub fn run() -> Outcome {
     cut_out(&picture(128, 128, |uv| blossom(uv).color), |uv| blossom(uv).height).save(textures.join("blossom.png"))?;
     normals(256, 256, 0.02, waves).save(textures.join("waves_normal.png"))?;
     fs::write(scenes.join("meshes/ring.obj"), ring(72, 20))?;
-    fs::write(scenes.join("meshes/ring.mtl"), "newmtl rope\nKd 1 1 1\nmap_Kd ../textures/rope.png\nnorm ../textures/rope_normal.png\n")?;
+    fs::write(
+        scenes.join("meshes/ring.mtl"),
+        "newmtl rope\nKd 1 1 1\nmap_Kd ../textures/rope.png\nnorm ../textures/rope_normal.png\n",
+    )?;
     Ok(())
 }
 
@@ -56,7 +59,9 @@ fn picture(width: u32, height: u32, color: impl Fn(V2) -> V) -> RgbImage {
 }
 
 fn heights(width: u32, height: u32, of: impl Fn(V2) -> f32) -> GrayImage {
-    GrayImage::from_fn(width, height, |x, y| Luma([(of(uv_of(x, y, width, height)).clamp(0.0, 1.0) * 255.0).round() as u8]))
+    GrayImage::from_fn(width, height, |x, y| {
+        Luma([(of(uv_of(x, y, width, height)).clamp(0.0, 1.0) * 255.0).round() as u8])
+    })
 }
 
 /// A picture with an alpha from 0 to 1.
@@ -135,7 +140,10 @@ fn bricks(uv: V2) -> NormalPerturbation {
     let mortar = vec3(0.45, 0.43, 0.40) * (0.8 + 0.3 * rough);
     let rise = (edge / 0.08).clamp(0.0, 1.0);
     let rise = rise * rise * (3.0 - 2.0 * rise);
-    NormalPerturbation { color: if edge > 0.0 { brick } else { mortar }, height: rise * (0.8 + 0.2 * rough) + 0.1 * (1.0 - rise) * rough }
+    NormalPerturbation {
+        color: if edge > 0.0 { brick } else { mortar },
+        height: rise * (0.8 + 0.2 * rough) + 0.1 * (1.0 - rise) * rough,
+    }
 }
 
 /// Square tiles in two tones with joints.
@@ -202,7 +210,10 @@ fn leaf(uv: V2) -> NormalPerturbation {
 /// Five blossoms of five petals; their height is 1 inside and falls to 0 over a few pixels outside.
 fn blossom(uv: V2) -> NormalPerturbation {
     let mut out = NormalPerturbation { color: vec3(0.75, 0.50, 0.55), height: 0.0 };
-    for (i, middle) in [vec2(0.27, 0.30), vec2(0.72, 0.26), vec2(0.50, 0.52), vec2(0.26, 0.74), vec2(0.74, 0.73)].into_iter().enumerate() {
+    for (i, middle) in [vec2(0.27, 0.30), vec2(0.72, 0.26), vec2(0.50, 0.52), vec2(0.26, 0.74), vec2(0.74, 0.73)]
+        .into_iter()
+        .enumerate()
+    {
         let p = uv - middle;
         let angle = p.y.atan2(p.x) + i as f32;
         let distance = p.length() / 0.235;
@@ -248,7 +259,11 @@ fn ring(around: usize, tube: usize) -> String {
             let (outward, angle) = (vec3((TAU * u).sin(), 0.0, (TAU * u).cos()), TAU * v);
             let n = outward * -angle.cos() + V::Y * angle.sin();
             let p = outward * 0.42 + n * 0.13 + V::Y * 0.13;
-            let _ = writeln!(text, "v {:.4} {:.4} {:.4}\nvt {u:.4} {v:.4}\nvn {:.3} {:.3} {:.3}", p.x, p.y, p.z, n.x, n.y, n.z);
+            let _ = writeln!(
+                text,
+                "v {:.4} {:.4} {:.4}\nvt {u:.4} {v:.4}\nvn {:.3} {:.3} {:.3}",
+                p.x, p.y, p.z, n.x, n.y, n.z
+            );
         }
     }
     let index = |i: usize, j: usize| i * (tube + 1) + j + 1;

@@ -101,7 +101,9 @@ fn first_hit(equation: &Equation, ray: &Ray, center: DVec3) -> Result<Option<Fou
             return Err(());
         }
         if clearance > 0.0 {
-            let n = equation.coefficients.map_or(DVec3::Z, |[k, m, l, _]| DVec3::new(k * q[0], k * q[1], m * q[2] + 0.5 * l));
+            let n = equation
+                .coefficients
+                .map_or(DVec3::Z, |[k, m, l, _]| DVec3::new(k * q[0], k * q[1], m * q[2] + 0.5 * l));
             let condition = 1.0 / n.normalize().dot(ray.direction.as_dvec3().normalize()).abs();
             let p = std::array::from_fn(|i| &origin[i] + &d[i] * &t);
             return Ok(Some(Found { t, p, condition }));

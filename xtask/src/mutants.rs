@@ -46,7 +46,8 @@ enum Ending {
 pub fn run(names: Vec<String>) -> Outcome {
     let root = root();
     let mutants: Vec<Mutant> = serde_json::from_str(&fs::read_to_string(root.join("tests/mutants.json"))?)?;
-    let chosen: Vec<&Mutant> = mutants.iter().filter(|m| names.is_empty() || names.iter().any(|name| m.name.contains(name))).collect();
+    let chosen: Vec<&Mutant> =
+        mutants.iter().filter(|m| names.is_empty() || names.iter().any(|name| m.name.contains(name))).collect();
     if chosen.is_empty() {
         return Err("no mutant has such a name".into());
     }
@@ -67,8 +68,15 @@ pub fn run(names: Vec<String>) -> Outcome {
         eprintln!("{} of {}: {}", i + 1, chosen.len(), mutant.name);
         let missed = survivals(&tree, mutant)?;
         survivors += usize::from(!missed.is_empty());
-        let verdict = if missed.is_empty() { mutant.tests.join(", ") } else { format!("**not found** by {}", missed.join(", ")) };
-        println!("| {} | `{}`: `{}` → `{}` | {verdict} |", mutant.name, mutant.file, inline(&mutant.old), inline(&mutant.new));
+        let verdict =
+            if missed.is_empty() { mutant.tests.join(", ") } else { format!("**not found** by {}", missed.join(", ")) };
+        println!(
+            "| {} | `{}`: `{}` → `{}` | {verdict} |",
+            mutant.name,
+            mutant.file,
+            inline(&mutant.old),
+            inline(&mutant.new)
+        );
     }
     println!("\n{} faults, {} found.", chosen.len(), chosen.len() - survivors);
     if survivors > 0 { Err(format!("{survivors} faults survive").into()) } else { Ok(()) }
@@ -87,7 +95,8 @@ fn survivals<'a>(tree: &Path, mutant: &'a Mutant) -> Result<Vec<&'a str>> {
         return Err(format!("{}: {:?} is not there exactly once", mutant.file, mutant.old).into());
     }
     fs::write(&file, text.replacen(&mutant.old, &mutant.new, 1))?;
-    let endings: Result<Vec<_>> = mutant.tests.iter().map(|test| Ok((test.as_str(), run_tests(tree, &[test])?))).collect();
+    let endings: Result<Vec<_>> =
+        mutant.tests.iter().map(|test| Ok((test.as_str(), run_tests(tree, &[test])?))).collect();
     fs::write(&file, text)?;
     let endings = endings?;
     if endings.iter().any(|(_, ending)| *ending == Ending::DoesNotCompile) {
@@ -107,7 +116,12 @@ fn run_tests(tree: &Path, tests: &[&str]) -> Result<Ending> {
         }
         let cargo = |rest: &[&str]| {
             let mut command = Command::new("timeout");
-            command.args(["900", "cargo", "test"]).args(target).args(["--locked", "--quiet"]).args(rest).current_dir(tree);
+            command
+                .args(["900", "cargo", "test"])
+                .args(target)
+                .args(["--locked", "--quiet"])
+                .args(rest)
+                .current_dir(tree);
             // Quicker to build, and slow enough for nobody: each fault needs a build of its own.
             command
                 .env("CARGO_TARGET_DIR", tree.with_file_name("target"))

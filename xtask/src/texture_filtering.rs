@@ -84,7 +84,9 @@ impl Way {
     /// What a sample at a point of the picture sees; `u` are two more random numbers.
     fn look(self, image: &Bitmap, [x, y]: [f32; 2], u: [f32; 2], samples: u32) -> f32 {
         let uv = uv_at(x, y);
-        let over = |area: f32, samples: u32| image.scalar_over(&Footprint { area: area / samples as f32, ..Footprint::point(uv) });
+        let over = |area: f32, samples: u32| {
+            image.scalar_over(&Footprint { area: area / samples as f32, ..Footprint::point(uv) })
+        };
         let [shorter, longer] = cone_axes(x, y);
         match self {
             Self::Point => image.scalar(uv),
@@ -120,7 +122,8 @@ fn reference(image: &Bitmap) -> Vec<f64> {
     let middle = |i: u32| (i as f32 + 0.5) / n as f32;
     let pixel = |i: u32| {
         let (x, y) = ((i % WIDTH) as f32, (i / WIDTH) as f32);
-        (0..n * n).map(|k| f64::from(image.scalar(uv_at(x + middle(k % n), y + middle(k / n))))).sum::<f64>() / f64::from(n * n)
+        (0..n * n).map(|k| f64::from(image.scalar(uv_at(x + middle(k % n), y + middle(k / n))))).sum::<f64>()
+            / f64::from(n * n)
     };
     (0..WIDTH * HEIGHT).map(pixel).collect()
 }
@@ -134,13 +137,18 @@ pub fn run() {
         let hash = ((x * 73_856_093) ^ (y * 19_349_663)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         0.1 + 0.8 * ((hash >> 40) & 0xffff) as f32 / 65_535.0
     };
-    let images = [("checker", bitmap(|x, y| if (x / 32 + y / 32) % 2 == 0 { 0.1 } else { 0.9 })), ("noise", bitmap(noise))];
+    let images =
+        [("checker", bitmap(|x, y| if (x / 32 + y / 32) % 2 == 0 { 0.1 } else { 0.9 })), ("noise", bitmap(noise))];
     println!("relMSE against 4,096 points per pixel");
-    println!("{:<8} {:<14} {:>8} {:>8} {:>8} {:>8} {:>8} {:>10}", "image", "way", "1 spp", "4", "16", "64", "1,024", "ns/lookup");
+    println!(
+        "{:<8} {:<14} {:>8} {:>8} {:>8} {:>8} {:>8} {:>10}",
+        "image", "way", "1 spp", "4", "16", "64", "1,024", "ns/lookup"
+    );
     for (name, image) in &images {
         let reference = reference(image);
         for (way, label) in Way::ALL {
-            let errors = [1, 4, 16, 64, 1024].map(|samples| format!("{:8.5}", relative_mse(&reference, &picture(image, way, samples))));
+            let errors = [1, 4, 16, 64, 1024]
+                .map(|samples| format!("{:8.5}", relative_mse(&reference, &picture(image, way, samples))));
             let start = Instant::now();
             let lookups = 2_000_000u32;
             let mut sum = 0.0;

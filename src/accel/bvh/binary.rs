@@ -38,7 +38,8 @@ impl BinaryTree {
     pub fn traverse<C: Counter, const ANY: bool>(&self, query: &mut Query<'_, Bvh, C, ANY>) {
         let slab = SlabRay::new(&query.ray, &self.bounds(), query.slack());
         let t_min = query.ray.t_min;
-        let enter = |index: usize, t_max: f32| slab.interval(&self.nodes[index].bounds, t_min, t_max).map(|(near, _)| near);
+        let enter =
+            |index: usize, t_max: f32| slab.interval(&self.nodes[index].bounds, t_min, t_max).map(|(near, _)| near);
         let mut stack = ArrayVec::<(f32, usize), STACK>::new();
         let Some(near) = enter(0, query.t_max()) else { return };
         stack.push((near, 0));

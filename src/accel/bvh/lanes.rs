@@ -103,8 +103,10 @@ impl SimdIsa for V3 {
                 x._mm256_sub_ps(near, x._mm256_set1_ps(slab.near_origin[axis])),
                 x._mm256_set1_ps(slab.near_reciprocal[axis]),
             );
-            let far =
-                x._mm256_mul_ps(x._mm256_sub_ps(far, x._mm256_set1_ps(slab.far_origin[axis])), x._mm256_set1_ps(slab.far_reciprocal[axis]));
+            let far = x._mm256_mul_ps(
+                x._mm256_sub_ps(far, x._mm256_set1_ps(slab.far_origin[axis])),
+                x._mm256_set1_ps(slab.far_reciprocal[axis]),
+            );
             // The second operand wins over a NaN.
             enter = x._mm256_max_ps(near, enter);
             leave = x._mm256_min_ps(far, leave);
@@ -125,13 +127,15 @@ impl SimdIsa for V3 {
         // Lanes with a NaN pass or not; they fail the test of the interval.
         let lowest = x._mm256_min_pd(u, x._mm256_min_pd(v, w));
         let highest = x._mm256_max_pd(u, x._mm256_max_pd(v, w));
-        let outside = x._mm256_and_pd(x._mm256_cmp_pd::<_CMP_LT_OQ>(lowest, zero), x._mm256_cmp_pd::<_CMP_GT_OQ>(highest, zero));
+        let outside =
+            x._mm256_and_pd(x._mm256_cmp_pd::<_CMP_LT_OQ>(lowest, zero), x._mm256_cmp_pd::<_CMP_GT_OQ>(highest, zero));
         let candidates = !x._mm256_movemask_pd(outside) & 15;
         if candidates == 0 {
             return None;
         }
         let determinant = x._mm256_add_pd(x._mm256_add_pd(u, v), w);
-        let sum = x._mm256_add_pd(x._mm256_add_pd(x._mm256_mul_pd(u, a.z), x._mm256_mul_pd(v, b.z)), x._mm256_mul_pd(w, c.z));
+        let sum =
+            x._mm256_add_pd(x._mm256_add_pd(x._mm256_mul_pd(u, a.z), x._mm256_mul_pd(v, b.z)), x._mm256_mul_pd(w, c.z));
         let t = x._mm256_div_pd(sum, x._mm256_mul_pd(determinant, x._mm256_set1_pd(ray.dz)));
         let inside = x._mm256_and_pd(
             x._mm256_cmp_pd::<_CMP_LE_OQ>(x._mm256_set1_pd(ray.t_min), t),

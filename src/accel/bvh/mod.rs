@@ -81,7 +81,11 @@ impl Tree for Bvh {
         if items.len() == 0 {
             return Self(Layout::Empty);
         }
-        if options.binary { Self(Layout::Binary(BinaryTree::new(binary(items), items))) } else { Self::wide(items, V3::try_new()) }
+        if options.binary {
+            Self(Layout::Binary(BinaryTree::new(binary(items), items)))
+        } else {
+            Self::wide(items, V3::try_new())
+        }
     }
 
     #[inline]
@@ -145,7 +149,9 @@ fn visit_wide(wide: &Wide, visit: &mut dyn FnMut(&NodeInfo)) {
                     let blocks = &wide.blocks[first as usize..(first + count) as usize];
                     items.extend(blocks.iter().flat_map(|block| &block.items[..block.count as usize]));
                 }
-                ChildKind::Items { first, count } => items.extend_from_slice(&wide.items[first as usize..(first + count) as usize]),
+                ChildKind::Items { first, count } => {
+                    items.extend_from_slice(&wide.items[first as usize..(first + count) as usize]);
+                }
             }
             visit(&NodeInfo { bounds, depth: depth + 1, children: 0, items: &items });
         }

@@ -24,7 +24,8 @@ fn corner(random: &mut Sequence) -> Vec3 {
 fn ray(random: &mut Sequence) -> Ray {
     let origin = corner(random) * 2.0;
     let direction = match random.below(4) {
-        0 => [Vec3::X, -Vec3::Y, Vec3::new(0.0, -0.0, 1.0), Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, 1e-38, 1e-42)][random.below(5)],
+        0 => [Vec3::X, -Vec3::Y, Vec3::new(0.0, -0.0, 1.0), Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, 1e-38, 1e-42)]
+            [random.below(5)],
         1 => corner(random) - origin,
         _ => random.vec(),
     };
@@ -33,8 +34,11 @@ fn ray(random: &mut Sequence) -> Ray {
 }
 
 fn block(triangles: &[TrianglePoints]) -> Block {
-    let mut block =
-        Block { corners: [[[0.0; BLOCK]; 3]; 3], items: [Item::prim(ShapeId(0), PrimId(0)); BLOCK], count: triangles.len() as u32 };
+    let mut block = Block {
+        corners: [[[0.0; BLOCK]; 3]; 3],
+        items: [Item::prim(ShapeId(0), PrimId(0)); BLOCK],
+        count: triangles.len() as u32,
+    };
     for (lane, t) in triangles.iter().enumerate() {
         for (corner, p) in [t.a, t.b, t.c].into_iter().enumerate() {
             for axis in 0..3 {
@@ -179,7 +183,9 @@ fn any_number_of_threads_builds_the_same_tree() {
 fn garbage_ends_in_a_bounded_tree() {
     let mut random = Sequence(9);
     let one = [Vec3::ZERO, Vec3::X, Vec3::Y];
-    let fan = |i: usize| [Vec3::ZERO, Vec3::new((i as f32).sin(), (i as f32).cos(), 0.1), Vec3::new((i as f32).cos(), 0.2, 1.0)];
+    let fan = |i: usize| {
+        [Vec3::ZERO, Vec3::new((i as f32).sin(), (i as f32).cos(), 0.1), Vec3::new((i as f32).cos(), 0.2, 1.0)]
+    };
     // Each triangle half as large as the one before: the worst for a surface area heuristic.
     let shrinking = |i: usize| one.map(|p| p * 0.5f32.powi(i as i32 % 120) + Vec3::splat(0.5f32.powi(i as i32 % 120)));
     let mixed = |i: usize| {

@@ -13,7 +13,11 @@ type Entry = (f32, Child);
 
 /// [`Tree::traverse`](crate::accel::tree::Tree::traverse) with one instruction set.
 #[inline(always)]
-pub(super) fn traverse<L: SimdIsa, C: Counter, const ANY: bool>(lanes: L, wide: &Wide, query: &mut Query<'_, Bvh, C, ANY>) {
+pub(super) fn traverse<L: SimdIsa, C: Counter, const ANY: bool>(
+    lanes: L,
+    wide: &Wide,
+    query: &mut Query<'_, Bvh, C, ANY>,
+) {
     let ray = WideRay::new(SlabRay::new(&query.ray, &wide.bounds, query.slack()));
     let t_min = query.ray.t_min;
     let mut stack = ArrayVec::<Entry, STACK>::new();
@@ -62,18 +66,29 @@ fn sort_descending(entries: &mut [Entry]) {
 }
 
 #[inline(always)]
-fn leaf<L: SimdIsa, C: Counter, const ANY: bool>(lanes: L, wide: &Wide, child: Child, query: &mut Query<'_, Bvh, C, ANY>) -> bool {
+fn leaf<L: SimdIsa, C: Counter, const ANY: bool>(
+    lanes: L,
+    wide: &Wide,
+    child: Child,
+    query: &mut Query<'_, Bvh, C, ANY>,
+) -> bool {
     match child.kind() {
         ChildKind::Blocks { first, count } => {
             wide.blocks[first as usize..(first + count) as usize].iter().any(|block| test_block(lanes, block, query))
         }
-        ChildKind::Items { first, count } => wide.items[first as usize..(first + count) as usize].iter().any(|&item| query.test(item)),
+        ChildKind::Items { first, count } => {
+            wide.items[first as usize..(first + count) as usize].iter().any(|&item| query.test(item))
+        }
         ChildKind::Node(_) => false,
     }
 }
 
 #[inline(always)]
-fn test_block<L: SimdIsa, C: Counter, const ANY: bool>(lanes: L, block: &Block, query: &mut Query<'_, Bvh, C, ANY>) -> bool {
+fn test_block<L: SimdIsa, C: Counter, const ANY: bool>(
+    lanes: L,
+    block: &Block,
+    query: &mut Query<'_, Bvh, C, ANY>,
+) -> bool {
     query.counter.prims(block.count);
     let Some(hits) = lanes.intersect(block, &query.triangle_ray) else { return false };
     let mut mask = hits.mask;

@@ -109,7 +109,8 @@ pub(super) struct Wide {
 impl Wide {
     /// From a binary hierarchy, opening the child with the largest area until there are eight.
     pub fn new(binary: &Binary, items: &Items<'_>) -> Self {
-        let mut wide = Self { nodes: Vec::new(), blocks: Vec::new(), items: Vec::new(), bounds: binary.nodes[0].bounds, depth: 0 };
+        let mut wide =
+            Self { nodes: Vec::new(), blocks: Vec::new(), items: Vec::new(), bounds: binary.nodes[0].bounds, depth: 0 };
         wide.nodes.reserve(binary.references.len() / 8 + 1);
         wide.blocks.reserve(binary.references.len() / 3 + 1);
         wide.nodes.push(WideNode::EMPTY);
@@ -143,8 +144,11 @@ impl Wide {
         }
         let first = self.blocks.len();
         for chunk in references.chunks(BLOCK) {
-            let mut block =
-                Block { corners: [[[0.0; BLOCK]; 3]; 3], items: [items.list[chunk[0].item as usize]; BLOCK], count: chunk.len() as u32 };
+            let mut block = Block {
+                corners: [[[0.0; BLOCK]; 3]; 3],
+                items: [items.list[chunk[0].item as usize]; BLOCK],
+                count: chunk.len() as u32,
+            };
             for lane in 0..BLOCK {
                 let item = chunk.get(lane).unwrap_or(&chunk[0]).item as usize;
                 let Some(points) = items.triangle(item) else { continue };

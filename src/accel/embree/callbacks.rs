@@ -44,7 +44,12 @@ pub(super) unsafe extern "C" fn on_memory(user: *mut c_void, bytes: isize, _post
 }
 
 /// The distance at which `ray` hits the [`TransformedShape`] behind `shape`; negative on a miss.
-pub(super) unsafe extern "C" fn intersect_placed(shape: *const c_void, ray: *const sys::StRay, _key: u32, _instance: u32) -> f32 {
+pub(super) unsafe extern "C" fn intersect_placed(
+    shape: *const c_void,
+    ray: *const sys::StRay,
+    _key: u32,
+    _instance: u32,
+) -> f32 {
     // SAFETY: `shape` was made from a `&TransformedShape` inside the geometry that the accelerator borrows, which
     // nobody changes; `ray` points to a ray on the shim's stack, and `StRay` has the layout of `Ray`.
     let (placed, ray) = unsafe { (&*shape.cast::<TransformedShape>(), &*ray.cast::<Ray>()) };
@@ -53,20 +58,36 @@ pub(super) unsafe extern "C" fn intersect_placed(shape: *const c_void, ray: *con
 }
 
 /// [`intersect_placed`] for the rays of a packet.
-pub(super) unsafe extern "C" fn intersect_placed_packet(shape: *const c_void, rays: *const f32, n: u32, valid: *const i32, t: *mut f32) {
+pub(super) unsafe extern "C" fn intersect_placed_packet(
+    shape: *const c_void,
+    rays: *const f32,
+    n: u32,
+    valid: *const i32,
+    t: *mut f32,
+) {
     let n = n as usize;
     // SAFETY: the shape as in `intersect_placed`; the shim passes `n` lanes, at most a packet's, of rays in nine rows
     // and more, and of `valid`, and room for the distances of a packet. Every bit pattern is a number.
     let (placed, words, valid, t) = unsafe {
         let words = std::slice::from_raw_parts(rays, ROWS * n);
-        (&*shape.cast::<TransformedShape>(), words, std::slice::from_raw_parts(valid, n), &mut *t.cast::<[f32; PACKET_SIZE]>())
+        (
+            &*shape.cast::<TransformedShape>(),
+            words,
+            std::slice::from_raw_parts(valid, n),
+            &mut *t.cast::<[f32; PACKET_SIZE]>(),
+        )
     };
     let row = |k: usize| {
         let mut row = [0.0; PACKET_SIZE];
         row[..n].copy_from_slice(&words[k * n..(k + 1) * n]);
         row
     };
-    let rays = RayPacket { origin: [row(0), row(1), row(2)], t_min: row(3), direction: [row(4), row(5), row(6)], t_max: row(8) };
+    let rays = RayPacket {
+        origin: [row(0), row(1), row(2)],
+        t_min: row(3),
+        direction: [row(4), row(5), row(6)],
+        t_max: row(8),
+    };
     let hits = placed.intersect_packet(&rays);
     *t = hits.t;
     for lane in (0..n).filter(|&lane| valid[lane] != 0 && hits.is_undecided[lane] != 0) {
@@ -78,7 +99,11 @@ pub(super) unsafe extern "C" fn intersect_placed_packet(shape: *const c_void, ra
 const ROWS: usize = 9;
 
 /// Writes `ray` in the space of the [`Instance`] behind `instance`; false if it cannot be traced there.
-pub(super) unsafe extern "C" fn enter_instance(instance: *const c_void, ray: *const sys::StRay, inside: *mut sys::StRay) -> bool {
+pub(super) unsafe extern "C" fn enter_instance(
+    instance: *const c_void,
+    ray: *const sys::StRay,
+    inside: *mut sys::StRay,
+) -> bool {
     // SAFETY: `instance` was made from a `&Instance` inside the geometry that the accelerator borrows; both rays are on
     // the shim's stack, and `StRay` has the layout of `Ray`.
     let (instance, ray) = unsafe { (&*instance.cast::<Instance>(), &*ray.cast::<Ray>()) };
@@ -114,7 +139,12 @@ impl Filter {
 }
 
 /// As [`intersect_placed`] for the [`Filter`] of an analytic shape: hits in its holes do not count.
-pub(super) unsafe extern "C" fn intersect_cutout(filter: *const c_void, ray: *const sys::StRay, key: u32, instance: u32) -> f32 {
+pub(super) unsafe extern "C" fn intersect_cutout(
+    filter: *const c_void,
+    ray: *const sys::StRay,
+    key: u32,
+    instance: u32,
+) -> f32 {
     // SAFETY: `filter` was made from a `&Filter` that the accelerator owns; the ray as in `intersect_placed`.
     let (filter, ray) = unsafe { (&*filter.cast::<Filter>(), &*ray.cast::<Ray>()) };
     // SAFETY: the accelerator borrows the geometry.
@@ -124,7 +154,12 @@ pub(super) unsafe extern "C" fn intersect_cutout(filter: *const c_void, ray: *co
 }
 
 /// Whether a hit of a triangle of the [`Filter`] behind `user` counts.
-pub(super) unsafe extern "C" fn counts(user: *const c_void, ray: *const sys::StRay, key: u32, hit: *const sys::StHit) -> bool {
+pub(super) unsafe extern "C" fn counts(
+    user: *const c_void,
+    ray: *const sys::StRay,
+    key: u32,
+    hit: *const sys::StHit,
+) -> bool {
     // SAFETY: as in `intersect_cutout`; `hit` points to a hit on the shim's stack.
     let (filter, ray, hit) = unsafe { (&*user.cast::<Filter>(), &*ray.cast::<Ray>(), &*hit) };
     // SAFETY: the accelerator borrows the geometry.

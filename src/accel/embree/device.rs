@@ -70,7 +70,8 @@ impl Device {
     /// If Embree cannot make one, or lacks triangles, user geometry or filter functions.
     pub(super) fn new(threads: usize) -> Result<Self> {
         let config = if threads == 0 { String::new() } else { format!("threads={threads}") };
-        let config = CString::new(config).map_err(|_| Error::Internal("a device configuration with a zero byte".into()))?;
+        let config =
+            CString::new(config).map_err(|_| Error::Internal("a device configuration with a zero byte".into()))?;
         // SAFETY: the configuration is a C string, which Embree copies.
         let handle = unsafe { sys::rtcNewDevice(config.as_ptr()) };
         let Some(handle) = NonNull::new(handle) else {
@@ -131,7 +132,10 @@ impl Device {
     fn check_abilities(&self) -> Result<()> {
         let major = self.property(sys::RTC_DEVICE_PROPERTY_VERSION_MAJOR);
         if major != sys::RTC_VERSION_MAJOR as isize {
-            return Err(Error::Embree(format!("version {major} is installed, but this program was built for {}", sys::RTC_VERSION_MAJOR)));
+            return Err(Error::Embree(format!(
+                "version {major} is installed, but this program was built for {}",
+                sys::RTC_VERSION_MAJOR
+            )));
         }
         let needed = [
             (sys::RTC_DEVICE_PROPERTY_TRIANGLE_GEOMETRY_SUPPORTED, "triangles"),

@@ -44,9 +44,9 @@ impl RayLimits {
         let mut gate = Self::OPEN;
         // Instances that move test each ray themselves.
         for (i, instance) in instances.iter().enumerate().filter(|(_, instance)| instance.motion.is_none()) {
-            let InverseReach { reach, offset } = instance
-                .inverse_reach()
-                .ok_or_else(|| Error::Embree(format!("instance {i}: its transform is too small or too large to be inverted in f32")))?;
+            let InverseReach { reach, offset } = instance.inverse_reach().ok_or_else(|| {
+                Error::Embree(format!("instance {i}: its transform is too small or too large to be inverted in f32"))
+            })?;
             gate = Self::new(gate.origin.min((LIMIT - offset) / reach), gate.direction.min(LIMIT / reach));
         }
         Ok(gate)
@@ -72,7 +72,10 @@ impl RayLimits {
     pub(super) fn admits_to_packet(&self, ray: &Ray) -> bool {
         let tame = |x: f32| (x == 0.0) | (x.abs() >= SMALLEST_RECIPROCAL);
         let within = |v: Vec3, limit: f32| (v.x.abs() <= limit) & (v.y.abs() <= limit) & (v.z.abs() <= limit);
-        let admitted = ray.is_valid() & (ray.t_max > 0.0) & within(ray.origin, self.origin) & within(ray.direction, self.direction);
+        let admitted = ray.is_valid()
+            & (ray.t_max > 0.0)
+            & within(ray.origin, self.origin)
+            & within(ray.direction, self.direction);
         admitted & (ray.t_min < ray.t_max) & tame(ray.direction.x) & tame(ray.direction.y) & tame(ray.direction.z)
     }
 }
@@ -89,7 +92,11 @@ impl RayWords {
     #[inline(always)]
     pub(super) fn new(ray: &Ray) -> Self {
         let [o, d] = [ray.origin, ray.direction];
-        Self { origin_t_min: Vec4::new(o.x, o.y, o.z, ray.t_min), direction_time: Vec4::new(d.x, d.y, d.z, ray.time), t_max: ray.t_max }
+        Self {
+            origin_t_min: Vec4::new(o.x, o.y, o.z, ray.t_min),
+            direction_time: Vec4::new(d.x, d.y, d.z, ray.time),
+            t_max: ray.t_max,
+        }
     }
 }
 

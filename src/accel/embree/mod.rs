@@ -125,7 +125,11 @@ impl<'g> EmbreeAccel<'g> {
     /// What Embree calls back for, or keeps beside triangles at rest.
     pub(crate) fn registered(&self) -> Registered {
         let [filters, user_geometries] = self.user_shapes.counts();
-        let meshes = self.geometry.shapes.iter().filter_map(|shape| if let Shape::Mesh(mesh) = shape { Some(mesh) } else { None });
+        let meshes = self
+            .geometry
+            .shapes
+            .iter()
+            .filter_map(|shape| if let Shape::Mesh(mesh) = shape { Some(mesh) } else { None });
         let time_steps = meshes.map(|mesh| mesh.padded_steps().count() - 1).sum();
         Registered { filters, user_geometries, entered_instances: self.entered.count(), time_steps }
     }
@@ -141,8 +145,11 @@ impl<'g> EmbreeAccel<'g> {
     /// object it is the shape's place there.
     #[inline(always)]
     fn hit(&self, raw: StHit) -> Hit {
-        let (shape, instance) =
-            if raw.instance == INVALID { (ShapeId(raw.geometry), Hit::NO_INSTANCE) } else { self.instanced(raw.geometry, raw.instance) };
+        let (shape, instance) = if raw.instance == INVALID {
+            (ShapeId(raw.geometry), Hit::NO_INSTANCE)
+        } else {
+            self.instanced(raw.geometry, raw.instance)
+        };
         Hit { t: raw.t, u: raw.u, v: raw.v, shape, prim: PrimId(raw.prim), instance }
     }
 
@@ -166,7 +173,11 @@ impl<'g> EmbreeAccel<'g> {
 }
 
 /// One Embree geometry for each shape in use, however many objects share it.
-fn shape_handles(geometry: &Geometry, device: &Device, user_shapes: &UserShapes) -> Result<Vec<Option<GeometryHandle>>> {
+fn shape_handles(
+    geometry: &Geometry,
+    device: &Device,
+    user_shapes: &UserShapes,
+) -> Result<Vec<Option<GeometryHandle>>> {
     let mut handles: Vec<Option<GeometryHandle>> = geometry.shapes.iter().map(|_| None).collect();
     let used = geometry.world.iter().chain(geometry.objects.iter().flat_map(|object| &object.shapes));
     for id in used {
@@ -180,7 +191,12 @@ fn shape_handles(geometry: &Geometry, device: &Device, user_shapes: &UserShapes)
 }
 
 /// A committed scene for each object.
-fn object_scenes(geometry: &Geometry, device: &Device, shapes: &[Option<GeometryHandle>], options: EmbreeOptions) -> Result<Vec<Scene>> {
+fn object_scenes(
+    geometry: &Geometry,
+    device: &Device,
+    shapes: &[Option<GeometryHandle>],
+    options: EmbreeOptions,
+) -> Result<Vec<Scene>> {
     let object_scene = |ids: &[ShapeId]| -> Result<Scene> {
         let mut builder = SceneBuilder::new(device, options)?;
         scene::attach_shapes(&mut builder, shapes, ids, |position, _| position)?;

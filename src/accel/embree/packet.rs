@@ -141,7 +141,14 @@ impl HitPacket {
         self.rayhits.hit.instID = [[INVALID; WIDTH]];
         // SAFETY: the scene is committed, both structs are aligned by their types, and every valid lane has passed the
         // gate.
-        unsafe { sys::st_intersect16(tracer.scene.handle(), self.valid.0.as_ptr(), &mut self.rayhits, tracer.as_frustum(coherence)) };
+        unsafe {
+            sys::st_intersect16(
+                tracer.scene.handle(),
+                self.valid.0.as_ptr(),
+                &mut self.rayhits,
+                tracer.as_frustum(coherence),
+            );
+        };
         if !self.valid.is_full() {
             self.intersect_left_out(tracer, rays, lanes);
         }
@@ -186,10 +193,23 @@ impl ShadowPacket {
 
     /// Traces at most sixteen `lanes` of `rays`, the first of which is a multiple of 16: which of them hit anything.
     #[inline]
-    pub(super) fn occluded(&mut self, tracer: &Tracer, rays: &RayRows, lanes: Range<usize>, coherence: Coherence) -> [bool; WIDTH] {
+    pub(super) fn occluded(
+        &mut self,
+        tracer: &Tracer,
+        rays: &RayRows,
+        lanes: Range<usize>,
+        coherence: Coherence,
+    ) -> [bool; WIDTH] {
         fill(&mut self.rays, &mut self.valid, tracer, rays, lanes.clone());
         // SAFETY: as in `HitPacket::intersect`.
-        unsafe { sys::st_occluded16(tracer.scene.handle(), self.valid.0.as_ptr(), &mut self.rays, tracer.as_frustum(coherence)) };
+        unsafe {
+            sys::st_occluded16(
+                tracer.scene.handle(),
+                self.valid.0.as_ptr(),
+                &mut self.rays,
+                tracer.as_frustum(coherence),
+            );
+        };
         // A lane that was not traced keeps the finite end of an inactive ray.
         let mut found = self.rays.tfar.map(|t_far| t_far == f32::NEG_INFINITY);
         if !self.valid.is_full() {
@@ -218,7 +238,8 @@ pub(super) fn fill(packet: &mut RTCRay16, valid: &mut LaneMask, tracer: &Tracer,
     let (o, d) = (&rays.origin.0, &rays.direction.0);
     (packet.org_x, packet.org_y, packet.org_z) = (*lanes(&o[0], first), *lanes(&o[1], first), *lanes(&o[2], first));
     (packet.dir_x, packet.dir_y, packet.dir_z) = (*lanes(&d[0], first), *lanes(&d[1], first), *lanes(&d[2], first));
-    (packet.tnear, packet.tfar, packet.time) = (*lanes(&rays.t_min, first), *lanes(&rays.t_max, first), *lanes(&rays.time, first));
+    (packet.tnear, packet.tfar, packet.time) =
+        (*lanes(&rays.t_min, first), *lanes(&rays.t_max, first), *lanes(&rays.time, first));
     for lane in 0..WIDTH {
         valid.0[lane] = -i32::from(tracer.gate.admits_to_packet(&get(packet, lane)) & (lane < range.len()));
     }

@@ -53,11 +53,23 @@ impl UserShapes {
                         None => {
                             let shape = std::ptr::from_ref(placed).cast::<c_void>();
                             let intersect_packet = placed.intersects_packets().then_some(intersect_placed_packet as _);
-                            sys::StUserShape { shape, intersect: Some(intersect_placed), intersect_packet, lower, upper }
+                            sys::StUserShape {
+                                shape,
+                                intersect: Some(intersect_placed),
+                                intersect_packet,
+                                lower,
+                                upper,
+                            }
                         }
                         Some(filter) => {
                             let shape = std::ptr::from_ref(&**filter).cast::<c_void>();
-                            sys::StUserShape { shape, intersect: Some(intersect_cutout), intersect_packet: None, lower, upper }
+                            sys::StUserShape {
+                                shape,
+                                intersect: Some(intersect_cutout),
+                                intersect_packet: None,
+                                lower,
+                                upper,
+                            }
                         }
                     };
                     UserData::Analytic(raw, filter)
@@ -70,7 +82,10 @@ impl UserShapes {
     /// How many shapes have filters, and how many are user geometries.
     pub(super) fn counts(&self) -> [usize; 2] {
         let count = |of: fn(&UserData) -> bool| self.0.iter().filter(|data| of(data)).count();
-        [count(|data| matches!(data, UserData::FilteredTriangles(..))), count(|data| matches!(data, UserData::Analytic(..)))]
+        [
+            count(|data| matches!(data, UserData::FilteredTriangles(..))),
+            count(|data| matches!(data, UserData::Analytic(..))),
+        ]
     }
 
     /// The entry of one shape.
@@ -138,7 +153,9 @@ impl GeometryHandle {
             // SAFETY: the caller keeps the mesh alive.
             (Shape::Mesh(mesh), UserData::Triangles) => unsafe { Self::of_mesh(device, mesh, None) },
             // SAFETY: the caller keeps the mesh and the user data alive.
-            (Shape::Mesh(mesh), UserData::FilteredTriangles(filter, _)) => unsafe { Self::of_mesh(device, mesh, Some(filter)) },
+            (Shape::Mesh(mesh), UserData::FilteredTriangles(filter, _)) => unsafe {
+                Self::of_mesh(device, mesh, Some(filter))
+            },
             (Shape::Analytic(_), UserData::Analytic(user, _)) => {
                 // SAFETY: the device is alive; the caller keeps the user data alive.
                 let handle = unsafe { sys::st_new_user_geometry(device.handle(), user) };
@@ -165,7 +182,13 @@ impl GeometryHandle {
                 this.share(sys::RTC_BUFFER_TYPE_VERTEX, step, sys::RTC_FORMAT_FLOAT3, data, positions.len() - 1);
             }
             let triangles = mesh.triangles();
-            this.share(sys::RTC_BUFFER_TYPE_INDEX, 0, sys::RTC_FORMAT_UINT3, triangles.as_ptr().cast(), triangles.len());
+            this.share(
+                sys::RTC_BUFFER_TYPE_INDEX,
+                0,
+                sys::RTC_FORMAT_UINT3,
+                triangles.as_ptr().cast(),
+                triangles.len(),
+            );
             if let Some(filter) = filter {
                 sys::st_set_filter(handle, filter);
             }
@@ -178,7 +201,14 @@ impl GeometryHandle {
     ///
     /// # Safety
     /// There must be as many, and they must outlive the geometry.
-    unsafe fn share(&self, kind: sys::RTCBufferType, slot: u32, format: sys::RTCFormat, items: *const c_void, count: usize) {
+    unsafe fn share(
+        &self,
+        kind: sys::RTCBufferType,
+        slot: u32,
+        format: sys::RTCFormat,
+        items: *const c_void,
+        count: usize,
+    ) {
         // SAFETY: the handle is alive; the rest is guaranteed by the caller.
         unsafe { sys::rtcSetSharedGeometryBuffer(self.0.as_ptr(), kind, slot, format, items, 0, 12, count) }
     }
@@ -200,7 +230,8 @@ impl GeometryHandle {
         let handle = unsafe { sys::rtcNewGeometry(device.handle(), sys::RTC_GEOMETRY_TYPE_INSTANCE) };
         let this = Self::new(device, handle)?;
         let map = &instance.transform.world_from_object;
-        let columns = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis, map.translation].map(|c| c.as_vec3().to_array());
+        let columns = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis, map.translation]
+            .map(|c| c.as_vec3().to_array());
         // SAFETY: both handles are alive, the geometry keeps the object's scene alive, and Embree copies the twelve
         // floats.
         unsafe {

@@ -81,8 +81,11 @@ impl Builder<'_> {
         };
         let parallel = cell.parts.len() > PARALLEL;
         drop(cell);
-        let (lower, upper) =
-            if parallel { rayon::join(|| self.build(lower), || self.build(upper)) } else { (self.build(lower), self.build(upper)) };
+        let (lower, upper) = if parallel {
+            rayon::join(|| self.build(lower), || self.build(upper))
+        } else {
+            (self.build(lower), self.build(upper))
+        };
         join(&plane, lower, upper)
     }
 

@@ -182,7 +182,10 @@ fn split(items: &Items<'_>, cell: &Cell) -> Option<Vec<(u32, Cell)>> {
     let mut total = 0;
     for octant in 0..8u32 {
         let upper = glam::BVec3::new(octant & 1 != 0, octant & 2 != 0, octant & 4 != 0);
-        let bounds = Aabb { min: Vec3::select(upper, middle, cell.bounds.min), max: Vec3::select(upper, cell.bounds.max, middle) };
+        let bounds = Aabb {
+            min: Vec3::select(upper, middle, cell.bounds.min),
+            max: Vec3::select(upper, cell.bounds.max, middle),
+        };
         let part = |(index, part): &(u32, Aabb)| {
             // Most parts lie on one side; of the others, many only in the corner of their box.
             let near = part.min.cmple(bounds.max).all() && bounds.min.cmple(part.max).all();

@@ -55,7 +55,14 @@ impl<'g> Hierarchy<'g> {
         if items.len() == 0 || !(sphere.radius > 0.0) || !sphere.rounding().is_finite() {
             return None;
         }
-        let mut builder = Builder { geometry, items: &items, sphere, prims: Vec::new(), primitives: Vec::new(), references: Vec::new() };
+        let mut builder = Builder {
+            geometry,
+            items: &items,
+            sphere,
+            prims: Vec::new(),
+            primitives: Vec::new(),
+            references: Vec::new(),
+        };
         builder.collect();
         let Builder { prims, primitives, references, .. } = builder;
         if references.is_empty() {
@@ -75,7 +82,9 @@ impl<'g> Hierarchy<'g> {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        size_of_val(self.nodes.as_slice()) + size_of_val(self.primitives.as_slice()) + size_of_val(self.prims.as_slice())
+        size_of_val(self.nodes.as_slice())
+            + size_of_val(self.primitives.as_slice())
+            + size_of_val(self.prims.as_slice())
     }
 }
 
@@ -88,7 +97,9 @@ fn nodes(binary: &Binary, sphere: &BoundingSphere) -> Vec<Node> {
         let from = &binary.nodes[source];
         if let Some((parent, side)) = parent {
             let count = nodes.len() as u32;
-            let Node { content: NodeContent::Nodes { children, .. }, .. } = &mut nodes[parent as usize] else { continue };
+            let Node { content: NodeContent::Nodes { children, .. }, .. } = &mut nodes[parent as usize] else {
+                continue;
+            };
             let children: &mut [u32; 2] = children;
             children[side as usize] = count;
         }
@@ -143,14 +154,22 @@ impl<'g> Builder<'_, 'g> {
             return 1;
         }
         let triangle = PrimRecord::triangle(shape, id, &points);
-        let Some((next, corners)) = self.neighbor(index + 1, shape).and_then(|next| Some((next, quadrilateral(&points, &next)?))) else {
+        let Some((next, corners)) =
+            self.neighbor(index + 1, shape).and_then(|next| Some((next, quadrilateral(&points, &next)?)))
+        else {
             self.prims.push(triangle);
-            self.add(Primitive::Triangle(Polygon::new(&self.sphere, [points.a, points.b, points.c], n, number)), bounds);
+            self.add(
+                Primitive::Triangle(Polygon::new(&self.sphere, [points.a, points.b, points.c], n, number)),
+                bounds,
+            );
             return 1;
         };
         let [a, b, c, _] = corners;
         self.prims.extend([triangle.with_neighbor([a, c], b), PrimRecord::triangle(shape, PrimId(id.0 + 1), &next)]);
-        self.add(Primitive::Quadrilateral(Polygon::new(&self.sphere, corners, n, number)), bounds.union(&self.items.bounds[index + 1]));
+        self.add(
+            Primitive::Quadrilateral(Polygon::new(&self.sphere, corners, n, number)),
+            bounds.union(&self.items.bounds[index + 1]),
+        );
         2
     }
 

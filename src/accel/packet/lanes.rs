@@ -77,7 +77,10 @@ impl LaneSet {
     #[inline(always)]
     pub fn of<S: Simd>(simd: S, mask: S::m32s) -> Self {
         let mut lanes = [0u32; PACKET_SIZE];
-        simd.partial_store_u32s(&mut lanes[..S::F32_LANES], simd.select_u32s(mask, simd.splat_u32s(1), simd.splat_u32s(0)));
+        simd.partial_store_u32s(
+            &mut lanes[..S::F32_LANES],
+            simd.select_u32s(mask, simd.splat_u32s(1), simd.splat_u32s(0)),
+        );
         Self((0..PACKET_SIZE).fold(0, |set, lane| set | lanes[lane] << lane))
     }
 
@@ -222,7 +225,11 @@ impl<S: Simd> Packet<S> {
             t_min,
             t: s.select_f32s(s.and_m32s(is_fit, is_present), t_max, s.splat_f32s(f32::NEG_INFINITY)),
             prim: s.splat_u32s(NONE),
-            is_negative: [most_are_negative(s, direction[0]), most_are_negative(s, direction[1]), most_are_negative(s, direction[2])],
+            is_negative: [
+                most_are_negative(s, direction[0]),
+                most_are_negative(s, direction[1]),
+                most_are_negative(s, direction[2]),
+            ],
         };
         (packet, left_out)
     }
@@ -264,7 +271,8 @@ impl<S: Simd> Packet<S> {
         let prim = s.splat_u32s(prim);
         let is_first = s.and_m32s(s.equal_f32s(t, self.t), s.less_than_u32s(prim, self.prim));
         let is_closer = s.or_m32s(s.less_than_f32s(t, self.t), is_first);
-        let is_valid = s.and_m32s(s.greater_than_or_equal_f32s(t, self.t_min), s.less_than_f32s(t, s.splat_f32s(f32::INFINITY)));
+        let is_valid =
+            s.and_m32s(s.greater_than_or_equal_f32s(t, self.t_min), s.less_than_f32s(t, s.splat_f32s(f32::INFINITY)));
         let is_taken = s.and_m32s(s.and_m32s(is_hit, is_valid), is_closer);
         self.t = s.select_f32s(is_taken, if ANY { s.splat_f32s(f32::NEG_INFINITY) } else { t }, self.t);
         self.prim = s.select_u32s(is_taken, prim, self.prim);

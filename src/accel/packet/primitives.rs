@@ -62,7 +62,8 @@ impl<const N: usize> Polygon<N> {
         }
         // The ray passes all edges on one side, or on the other.
         let (error, minus_error) = (packet.edge_error, s.neg_f32s(packet.edge_error));
-        let may_hit = s.or_m32s(s.greater_than_or_equal_f32s(lowest, minus_error), s.less_than_or_equal_f32s(highest, error));
+        let may_hit =
+            s.or_m32s(s.greater_than_or_equal_f32s(lowest, minus_error), s.less_than_or_equal_f32s(highest, error));
         if !any(s, may_hit) {
             return;
         }
@@ -161,7 +162,9 @@ fn distances(placed: &TransformedShape, lanes: LaneSet, rays: &RayPacket) -> [f3
         lanes.lanes().for_each(|lane| distances[lane] = alone(lane));
     } else {
         let hits = placed.intersect_packet(rays);
-        lanes.lanes().for_each(|lane| distances[lane] = if hits.is_undecided[lane] == 0 { hits.t[lane] } else { alone(lane) });
+        lanes
+            .lanes()
+            .for_each(|lane| distances[lane] = if hits.is_undecided[lane] == 0 { hits.t[lane] } else { alone(lane) });
     }
     distances
 }

@@ -81,7 +81,12 @@ fn rays(random: &mut Sequence, geometry: &Geometry) -> Vec<Ray> {
         };
         let t_max = if random.below(3) == 0 { random.next().abs() * 3.0 } else { f32::INFINITY };
         let time = if random.below(50) == 0 { f32::NAN } else { 0.5 };
-        Ray { t_max, t_min: if random.below(3) == 0 { t_max.min(0.3) } else { 0.0 }, time, ..Ray::new(origin, direction) }
+        Ray {
+            t_max,
+            t_min: if random.below(3) == 0 { t_max.min(0.3) } else { 0.0 },
+            time,
+            ..Ray::new(origin, direction)
+        }
     };
     (0..if cfg!(miri) { 40 } else { 20_000 }).map(|_| ray()).collect()
 }
@@ -110,7 +115,10 @@ fn packets_hit_what_the_oracle_hits() {
             let off = f64::from((hit.t - expected.t).abs() * ray.direction.length());
             assert!(off <= 8.0 * UNIT_ROUNDOFF * reach, "{number}: {ray:?} {hit:?} {expected:?} {off}");
             if hit.prim == expected.prim && hit.shape == expected.shape {
-                assert!((hit.u - expected.u).abs() < 1e-3 && (hit.v - expected.v).abs() < 1e-3, "{number}: {ray:?} {hit:?} {expected:?}");
+                assert!(
+                    (hit.u - expected.u).abs() < 1e-3 && (hit.v - expected.v).abs() < 1e-3,
+                    "{number}: {ray:?} {hit:?} {expected:?}"
+                );
             }
         }
         assert!(found > rays.len() / 50, "{number}: {found}");
@@ -122,7 +130,8 @@ fn answers<S: Simd>(simd: S, packets: &Hierarchy<'_>, rays: &[Ray]) -> (Vec<Opti
     let (rows, count) = (RayRows::of(rays), rays.len());
     let (mut hits, mut occluded) = (HitRows::default(), [false; BATCH]);
     Closest { hierarchy: packets, rays: &rows, count, hits: &mut hits, alone: |_: &Ray| None }.with_simd(simd);
-    Occluded { hierarchy: packets, rays: &rows, count, occluded: &mut occluded, alone: |_: &Ray| false }.with_simd(simd);
+    Occluded { hierarchy: packets, rays: &rows, count, occluded: &mut occluded, alone: |_: &Ray| false }
+        .with_simd(simd);
     ((0..count).map(|lane| hits.get(lane)).collect(), occluded[..count].to_vec())
 }
 
@@ -145,7 +154,10 @@ fn few_primitives_at_rest_suit_packets() {
     assert!(PacketBvh::suits(&mesh_geometry(&cube(0))));
     assert!(!PacketBvh::suits(&Geometry::default()));
     let mut random = Sequence(3);
-    assert!(PacketBvh::suits(&mesh_geometry(&soup(&mut random, FEW))) && !PacketBvh::suits(&mesh_geometry(&soup(&mut random, FEW + 1))));
+    assert!(
+        PacketBvh::suits(&mesh_geometry(&soup(&mut random, FEW)))
+            && !PacketBvh::suits(&mesh_geometry(&soup(&mut random, FEW + 1)))
+    );
     // Flat pairs count once.
     let many: Vec<_> = std::iter::repeat_n(cube(0), FEW / 6).flatten().collect();
     assert!(many.len() > FEW && PacketBvh::suits(&mesh_geometry(&many)));

@@ -74,10 +74,14 @@ impl Hierarchy<'_> {
                         for primitive in &self.primitives[first as usize..(first + count) as usize] {
                             match primitive {
                                 Primitive::Triangle(polygon) => {
-                                    polygon.intersect::<S, ANY>(simd, packet, |lanes, rays| self.exact(polygon.prim, 1, lanes, rays));
+                                    polygon.intersect::<S, ANY>(simd, packet, |lanes, rays| {
+                                        self.exact(polygon.prim, 1, lanes, rays)
+                                    });
                                 }
                                 Primitive::Quadrilateral(polygon) => {
-                                    polygon.intersect::<S, ANY>(simd, packet, |lanes, rays| self.exact(polygon.prim, 2, lanes, rays));
+                                    polygon.intersect::<S, ANY>(simd, packet, |lanes, rays| {
+                                        self.exact(polygon.prim, 2, lanes, rays)
+                                    });
                                 }
                                 Primitive::Shape(placed, prim) => {
                                     intersect_shape::<S, ANY>(simd, placed, *prim, LaneSet::of(simd, entering), packet);

@@ -73,8 +73,12 @@ fn clip_triangle(triangle: &TrianglePoints, cell: &Aabb) -> Aabb {
             None => return *cell,
         }
     }
-    let bounds = polygon.corners[..polygon.count].iter().fold(Bounds::EMPTY, |bounds, &p| bounds.extended(p)).grown(margin);
-    let part = Aabb { min: Vec3::from(bounds.min.to_array().map(round_down)), max: Vec3::from(bounds.max.to_array().map(round_up)) };
+    let bounds =
+        polygon.corners[..polygon.count].iter().fold(Bounds::EMPTY, |bounds, &p| bounds.extended(p)).grown(margin);
+    let part = Aabb {
+        min: Vec3::from(bounds.min.to_array().map(round_down)),
+        max: Vec3::from(bounds.max.to_array().map(round_up)),
+    };
     intersection(&part, cell)
 }
 
@@ -205,7 +209,10 @@ mod tests {
                     // The point itself is rounded; what it may miss is far below a float.
                     let slack = 1e-13 * p.abs().max_element().max(1.0);
                     let grown = Bounds { min: clipped.min.as_dvec3() - slack, max: clipped.max.as_dvec3() + slack };
-                    assert!(overlaps && grown.min.cmple(p).all() && p.cmple(grown.max).all(), "{triangle:?} {cell:?} {p}");
+                    assert!(
+                        overlaps && grown.min.cmple(p).all() && p.cmple(grown.max).all(),
+                        "{triangle:?} {cell:?} {p}"
+                    );
                 }
             }
             let simple = intersection(&triangle.bounds(), cell);
@@ -230,7 +237,10 @@ mod tests {
                 let size = whole.min.abs().max(whole.max.abs()).max(Vec3::splat(1e-3));
                 let near = |a: Vec3, b: Vec3| ((a - b).abs()).cmple(size * (8.0 * f32::EPSILON)).all();
                 assert_eq!(union.is_empty(), whole.is_empty(), "{triangle:?} {cell:?}");
-                assert!(whole.is_empty() || (near(union.min, whole.min) && near(union.max, whole.max)), "{union:?} {whole:?}");
+                assert!(
+                    whole.is_empty() || (near(union.min, whole.min) && near(union.max, whole.max)),
+                    "{union:?} {whole:?}"
+                );
                 if items.overlaps(0, cell) {
                     assert!(items.overlaps(0, &below) || items.overlaps(0, &above), "{triangle:?} {cell:?}");
                 }
@@ -263,7 +273,8 @@ mod tests {
         let clipped = items.clipped_bounds(0, &cell(0.5, 0.5, 1.0));
         let exact = Aabb { min: Vec3::new(0.5, 0.5, 1.0), max: Vec3::new(1.5, 1.5, 2.0) };
         assert!(
-            (clipped.min - exact.min).abs().max_element() < 1e-6 && (clipped.max - exact.max).abs().max_element() < 1e-6,
+            (clipped.min - exact.min).abs().max_element() < 1e-6
+                && (clipped.max - exact.max).abs().max_element() < 1e-6,
             "{clipped:?}"
         );
     }

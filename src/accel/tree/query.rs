@@ -55,7 +55,15 @@ impl<'a, T: Tree, C: Counter, const ANY: bool> Query<'a, T, C, ANY> {
     #[inline(always)]
     pub fn new(accel: &'a TwoLevel<'a, T>, ray: &Ray, counter: &'a mut C) -> Self {
         let key = accel.geometry().cutouts.key(ray);
-        Self { ray: *ray, triangle_ray: TriangleRay::from(ray), best: None, counter, instance: Hit::NO_INSTANCE, key, accel }
+        Self {
+            ray: *ray,
+            triangle_ray: TriangleRay::from(ray),
+            best: None,
+            counter,
+            instance: Hit::NO_INSTANCE,
+            key,
+            accel,
+        }
     }
 
     /// Largest of the distances that still matter, inclusive.
@@ -80,7 +88,9 @@ impl<'a, T: Tree, C: Counter, const ANY: bool> Query<'a, T, C, ANY> {
                 match self.accel.geometry().shape(shape) {
                     Shape::Mesh(mesh) => {
                         let hit = self.triangle_ray.intersect(&mesh.triangle_points_at(prim, self.ray.time));
-                        hit.is_some_and(|h| self.offer(Hit { t: h.t, u: h.u, v: h.v, shape, prim, instance: self.instance }))
+                        hit.is_some_and(|h| {
+                            self.offer(Hit { t: h.t, u: h.u, v: h.v, shape, prim, instance: self.instance })
+                        })
                     }
                     Shape::Analytic(_) => {
                         let hit = self.accel.geometry().intersect_prim(&self.ray, self.key, shape, prim, self.instance);

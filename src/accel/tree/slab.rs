@@ -47,7 +47,8 @@ impl SlabRay {
         Self {
             near_origin: ray.origin + outward,
             far_origin: ray.origin - outward,
-            near_reciprocal: reciprocal.clamp(Vec3::splat(-LARGEST_RECIPROCAL), Vec3::splat(LARGEST_RECIPROCAL)) * (1.0 - RELATIVE),
+            near_reciprocal: reciprocal.clamp(Vec3::splat(-LARGEST_RECIPROCAL), Vec3::splat(LARGEST_RECIPROCAL))
+                * (1.0 - RELATIVE),
             far_reciprocal: reciprocal * (1.0 + RELATIVE),
             negative,
         }
@@ -58,7 +59,11 @@ impl SlabRay {
     pub fn interval(&self, bounds: &Aabb, t_min: f32, t_max: f32) -> Option<(f32, f32)> {
         let (mut enter, mut leave) = (t_min, t_max);
         for axis in 0..3 {
-            let (near, far) = if self.negative[axis] { (bounds.max[axis], bounds.min[axis]) } else { (bounds.min[axis], bounds.max[axis]) };
+            let (near, far) = if self.negative[axis] {
+                (bounds.max[axis], bounds.min[axis])
+            } else {
+                (bounds.min[axis], bounds.max[axis])
+            };
             let near = (near - self.near_origin[axis]) * self.near_reciprocal[axis];
             let far = (far - self.far_origin[axis]) * self.far_reciprocal[axis];
             enter = if near > enter { near } else { enter };

@@ -21,8 +21,11 @@ impl<'g, T: Tree> TwoLevel<'g, T> {
     /// Builds all trees with `threads` threads (0: all).
     pub fn new(geometry: &'g Geometry, options: &T::Options, threads: usize) -> Self {
         let build = || {
-            let objects: Vec<T> =
-                geometry.objects.iter().map(|object| T::build(&Items::of_shapes(geometry, &object.shapes), options)).collect();
+            let objects: Vec<T> = geometry
+                .objects
+                .iter()
+                .map(|object| T::build(&Items::of_shapes(geometry, &object.shapes), options))
+                .collect();
             let bounds: Vec<Aabb> = objects.iter().map(T::bounds).collect();
             (T::build(&Items::of_world(geometry, &bounds), options), objects)
         };
@@ -83,13 +86,17 @@ struct InstanceRounding {
 impl InstanceRounding {
     /// `None` if there are no instances.
     fn of(geometry: &Geometry) -> Option<Self> {
-        let norm = |m: &DAffine3| (m.matrix3.x_axis.abs() + m.matrix3.y_axis.abs() + m.matrix3.z_axis.abs()).max_element();
+        let norm =
+            |m: &DAffine3| (m.matrix3.x_axis.abs() + m.matrix3.y_axis.abs() + m.matrix3.z_axis.abs()).max_element();
         let bounds = geometry.bounds();
         let reach = bounds.min.abs().max(bounds.max.abs()).max_element();
         let mut rounding: Option<Self> = None;
         let at_rest = |instance: &Instance| instance.motion.is_none().then_some(instance.transform);
-        let moving = |instance: &Instance| instance.motion.clone().map(|motion| Motion::sample_times().map(move |time| motion.at(time)));
-        let transforms = geometry.instances.iter().flat_map(|i| at_rest(i).into_iter().chain(moving(i).into_iter().flatten()));
+        let moving = |instance: &Instance| {
+            instance.motion.clone().map(|motion| Motion::sample_times().map(move |time| motion.at(time)))
+        };
+        let transforms =
+            geometry.instances.iter().flat_map(|i| at_rest(i).into_iter().chain(moving(i).into_iter().flatten()));
         for Transform { world_from_object, object_from_world, .. } in transforms {
             // One rounding of the origin and one of the direction, with room for the arithmetic in f64 and for what
             // lies between the times at which motions were sampled.

@@ -67,9 +67,16 @@ mod tests {
 
     #[test]
     fn damaged_files_are_refused() {
-        for header in
-            ["", "PF", "PF\n2 2\n-1\n", "PG\n1 1\n-1\n", "PF\n0 1\n-1\n", "PF 99999999999 99999999999 -1\n", "PF 1 1 0\n", "PF 1 1 nan\n"]
-        {
+        for header in [
+            "",
+            "PF",
+            "PF\n2 2\n-1\n",
+            "PG\n1 1\n-1\n",
+            "PF\n0 1\n-1\n",
+            "PF 99999999999 99999999999 -1\n",
+            "PF 1 1 0\n",
+            "PF 1 1 nan\n",
+        ] {
             assert!(parse(&file(header, &[0.0; 5], true)).is_none(), "{header}");
         }
     }

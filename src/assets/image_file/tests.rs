@@ -54,7 +54,10 @@ fn the_first_bytes_say_what_a_file_is() {
     std::fs::rename(&jpeg, &renamed).unwrap();
     let read = read_image(&renamed).unwrap();
     let Samples::U8(samples) = read.samples else { panic!("{:?}", read.samples) };
-    assert!(samples.chunks(3).all(|p| p[0].abs_diff(90) < 4 && p[1].abs_diff(120) < 4 && p[2].abs_diff(200) < 4), "{samples:?}");
+    assert!(
+        samples.chunks(3).all(|p| p[0].abs_diff(90) < 4 && p[1].abs_diff(120) < 4 && p[2].abs_diff(200) < 4),
+        "{samples:?}"
+    );
 }
 
 #[test]
@@ -72,7 +75,10 @@ fn floats_stay_floats_and_take_16_bits_only_without_loss() {
     assert_eq!((read.width, read.height, read.channels), (3, 2, 4));
     assert!(matches!(&read.samples, Samples::F32(s) if s[4 * 4..4 * 5] == [1.0, 1.0, 0.1, 0.5]), "{read:?}");
 
-    exr::prelude::write_rgb_file(&exr, 3, 2, |x, y| (f16::from_f32(0.1), f16::from_f32(x as f32), f16::from_f32(y as f32))).unwrap();
+    exr::prelude::write_rgb_file(&exr, 3, 2, |x, y| {
+        (f16::from_f32(0.1), f16::from_f32(x as f32), f16::from_f32(y as f32))
+    })
+    .unwrap();
     let read = read_image(&exr).unwrap();
     assert!(matches!(&read.samples, Samples::F16(s) if read.channels == 3 && s[3] == f16::from_f32(0.1)), "{read:?}");
 }
@@ -90,7 +96,10 @@ fn an_exr_image_of_one_channel_is_grey() {
     };
     for names in [&["height"][..], &["Y", "normal.X"]] {
         let read = write(names).unwrap();
-        assert_eq!((read.channels, &read.samples), (1, &Samples::F16([0.5, 1.0, 1.5, 2.0].map(f16::from_f32).to_vec())));
+        assert_eq!(
+            (read.channels, &read.samples),
+            (1, &Samples::F16([0.5, 1.0, 1.5, 2.0].map(f16::from_f32).to_vec()))
+        );
     }
     assert!(matches!(write(&["U", "V"]), Err(AssetError::Malformed(m)) if m.contains("neither R, G and B nor Y")));
 }
@@ -131,13 +140,19 @@ fn sizes_that_no_image_has_are_rejected_before_memory_is_allocated() {
     };
     assert!(matches!(tga(65_535, 65_535), Err(AssetError::Malformed(m)) if m.contains("too many")));
     assert!(matches!(tga(0, 4), Err(AssetError::Malformed(_))));
-    assert!(check_size(0, 5).is_err() && check_size(1 << 14, 1 << 14).is_ok() && check_size(usize::MAX, usize::MAX).is_err());
+    assert!(
+        check_size(0, 5).is_err()
+            && check_size(1 << 14, 1 << 14).is_ok()
+            && check_size(usize::MAX, usize::MAX).is_err()
+    );
 }
 
 #[test]
 fn what_is_no_image_is_named_so() {
     let folder = folder();
-    for (name, content) in [("a.png", &b"not an image"[..]), ("a.exr", b"GIF89a......"), ("a.tga", b"text"), ("a", b"\0\0\0\0")] {
+    for (name, content) in
+        [("a.png", &b"not an image"[..]), ("a.exr", b"GIF89a......"), ("a.tga", b"text"), ("a", b"\0\0\0\0")]
+    {
         let path = folder.path().join(name);
         std::fs::write(&path, content).unwrap();
         assert!(matches!(read_image(&path), Err(AssetError::Malformed(_))), "{name}");
@@ -150,10 +165,12 @@ fn what_is_no_image_is_named_so() {
 fn a_header_that_claims_more_than_the_file_can_hold_is_refused_and_flat_images_are_not() {
     let folder = folder();
     for name in ["flat.png", "flat.jpg", "flat.tga"] {
-        let path = save(DynamicImage::ImageLuma8(ImageBuffer::from_pixel(3000, 2000, image::Luma([40]))), &folder, name);
+        let path =
+            save(DynamicImage::ImageLuma8(ImageBuffer::from_pixel(3000, 2000, image::Luma([40]))), &folder, name);
         assert_eq!(read_image(&path).unwrap().width, 3000, "{name}");
     }
-    let small = save(DynamicImage::ImageLuma8(ImageBuffer::from_pixel(30, 20, image::Luma([40]))), &folder, "small.png");
+    let small =
+        save(DynamicImage::ImageLuma8(ImageBuffer::from_pixel(30, 20, image::Luma([40]))), &folder, "small.png");
     let mut bytes = std::fs::read(small).unwrap();
     bytes[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 0, 12, 0]);
     // The checksum of the header: this is no damaged file.

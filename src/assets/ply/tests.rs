@@ -1,6 +1,7 @@
 use super::*;
 
-const HEADER: &str = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty float s\nproperty float t\n\
+const HEADER: &str = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty float s\n\
+                      property float t\n\
                       element face 1\nproperty list uchar int vertex_indices\nend_header\n";
 
 fn expected() -> MeshData {
@@ -38,15 +39,21 @@ fn all_encodings_give_the_same_mesh() {
 
 #[test]
 fn vertices_and_faces_have_attributes() {
-    let text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float temp_0\nproperty float x\nproperty float y\nproperty float z\n\
+    let text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float temp_0\nproperty float x\nproperty float y\n\
+                property float z\n\
                 property double d_x\nproperty uchar d_y\nproperty float d_z\nelement face 2\nproperty float q_0\n\
-                property list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n\
-                0.5 0 0 0 0.25 7 1\n1.5 1 0 0 1 8 2\n2.5 1 1 0 2 9 3\n-1 0 1 0 3 10 4\n9 4 0 1 2 3 255 0 0\n8 3 0 1 2 0 255 0\n";
+                property list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
+                end_header\n\
+                0.5 0 0 0 0.25 7 1\n1.5 1 0 0 1 8 2\n2.5 1 1 0 2 9 3\n-1 0 1 0 3 10 4\n9 4 0 1 2 3 255 0 0\n\
+                8 3 0 1 2 0 255 0\n";
     let mesh = parse_ply(text.as_bytes()).unwrap();
     let expected = [
         ("face_color", AttributeValues::Colors(vec![[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])),
         ("face_q", AttributeValues::Numbers(vec![9.0, 9.0, 8.0])),
-        ("vertex_d", AttributeValues::Colors(vec![[0.25, 7.0, 1.0], [1.0, 8.0, 2.0], [2.0, 9.0, 3.0], [3.0, 10.0, 4.0]])),
+        (
+            "vertex_d",
+            AttributeValues::Colors(vec![[0.25, 7.0, 1.0], [1.0, 8.0, 2.0], [2.0, 9.0, 3.0], [3.0, 10.0, 4.0]]),
+        ),
         ("vertex_temp", AttributeValues::Numbers(vec![0.5, 1.5, 2.5, -1.0])),
     ];
     assert_eq!(mesh.attributes, expected.clone().map(|(name, values)| (name.to_owned(), values)).into());
@@ -91,7 +98,9 @@ fn elements_without_properties_take_no_time() {
 
 #[test]
 fn doubles_far_from_the_origin_keep_their_digits() {
-    let far = ascii().replace("property float x", "property double x").replace("\n1 0 0 1 0\n1 1", "\n8388608.25 0 0 1 0\n8388608.25 1");
+    let far = ascii()
+        .replace("property float x", "property double x")
+        .replace("\n1 0 0 1 0\n1 1", "\n8388608.25 0 0 1 0\n8388608.25 1");
     let far = far.replace("\n0 0 0 0 0\n", "\n8388607.5 0 0 0 0\n").replace("\n0 1 0 0 1\n", "\n8388607.5 1 0 0 1\n");
     let mesh = parse_ply(far.as_bytes()).unwrap();
     assert_eq!(mesh.position(mesh.positions[1]).x - mesh.position(mesh.positions[0]).x, 0.75);
@@ -101,7 +110,9 @@ fn doubles_far_from_the_origin_keep_their_digits() {
 #[test]
 fn files_without_faces_are_meshes_without_triangles() {
     let text = ascii();
-    let cloud = |text: &str| (parse_ply(text.as_bytes()).unwrap().positions.len(), parse_ply(text.as_bytes()).unwrap().triangles.len());
+    let cloud = |text: &str| {
+        (parse_ply(text.as_bytes()).unwrap().positions.len(), parse_ply(text.as_bytes()).unwrap().triangles.len())
+    };
     assert_eq!(cloud(&text.replace("4 0 1 2 3", "2 0 1")), (4, 0));
     assert_eq!(cloud(&text.replace("face 1", "face 0").replace("4 0 1 2 3\n", "")), (4, 0));
     let list = "element face 1\nproperty list uchar int vertex_indices\n";
@@ -116,15 +127,26 @@ fn long_files_are_read_piece_by_piece() {
     let faces: String = (0..count).map(|i| format!("3 0 {i} {}\n", i / 2)).collect();
     let text = format!("ply\nformat ascii 1.0\n{header}{vertices}{faces}");
     let mesh = parse_ply(text.as_bytes()).unwrap();
-    assert_eq!((mesh.positions.len(), mesh.triangles.len(), mesh.uvs.map(|uvs| uvs.len())), (count, count, Some(count)));
+    assert_eq!(
+        (mesh.positions.len(), mesh.triangles.len(), mesh.uvs.map(|uvs| uvs.len())),
+        (count, count, Some(count))
+    );
     for i in [0, AT_ONCE - 1, AT_ONCE, count - 1] {
-        assert_eq!((mesh.positions[i], mesh.triangles[i]), ([i as f32, 0.0, (i % 7) as f32], [0, i as u32, i as u32 / 2]));
+        assert_eq!(
+            (mesh.positions[i], mesh.triangles[i]),
+            ([i as f32, 0.0, (i % 7) as f32], [0, i as u32, i as u32 / 2])
+        );
     }
     let late = AT_ONCE + 2;
     let error = |text: &str| parse_ply(text.as_bytes()).unwrap_err().to_string();
-    assert!(error(&text.replace(&format!("3 0 {late} "), &format!("3 -1 {late} "))).contains(&format!("face {late} refers to vertex -1")));
+    assert!(
+        error(&text.replace(&format!("3 0 {late} "), &format!("3 -1 {late} ")))
+            .contains(&format!("face {late} refers to vertex -1"))
+    );
     assert!(error(&text[..text.len() - 20]).contains(&format!("after {} of {count} elements", 2 * AT_ONCE)));
-    assert!(error(&text.replace(&format!("\n{late} 0 "), &format!("\n{late} x "))).contains(&format!("Line {}", 12 + late)));
+    assert!(
+        error(&text.replace(&format!("\n{late} 0 "), &format!("\n{late} x "))).contains(&format!("Line {}", 12 + late))
+    );
 }
 
 #[test]
@@ -135,9 +157,12 @@ fn faults_of_text_files_have_a_line() {
 
 #[test]
 fn normals_other_types_and_other_elements_are_read() {
-    let text = "ply\r\nformat ascii 1.0\r\ncomment made by hand\r\nelement camera 1\r\nproperty list uchar float view\r\nelement face 1\r\n\
-                property list uint8 uint16 vertex_index\r\nproperty uchar red\r\nelement vertex 3\r\nproperty double x\r\nproperty short y\r\n\
-                property float z\r\nproperty float nx\r\nproperty float ny\r\nproperty float nz\r\nproperty uchar red\r\nend_header\r\n\
+    let text = "ply\r\nformat ascii 1.0\r\ncomment made by hand\r\nelement camera 1\r\n\
+                property list uchar float view\r\nelement face 1\r\n\
+                property list uint8 uint16 vertex_index\r\nproperty uchar red\r\nelement vertex 3\r\n\
+                property double x\r\nproperty short y\r\n\
+                property float z\r\nproperty float nx\r\nproperty float ny\r\nproperty float nz\r\n\
+                property uchar red\r\nend_header\r\n\
                 2 0.5 0.5\r\n3 2 1 0 255\r\n0 0 0 0 0 1 9\r\n1.5 0 0 0 0 1 9\r\n0 -2 0 0 0 1 9\r\n";
     for text in [text.to_owned(), text.replace("\r\n", "\n")] {
         let mesh = parse_ply(text.as_bytes()).unwrap();
@@ -153,14 +178,18 @@ fn colours_are_linear_as_floats_and_encoded_as_whole_numbers() {
     let colors = |kind: &str, names: [&str; 3], color: &str| {
         let properties: String = names.map(|name| format!("property {kind} {name}\n")).concat();
         let text = format!(
-            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{properties}\
-             element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 {color}\n1 0 0 {color}\n0 1 0 {color}\n3 0 1 2\n"
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+             {properties}element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 {color}\n\
+             1 0 0 {color}\n0 1 0 {color}\n3 0 1 2\n"
         );
         parse_ply(text.as_bytes()).unwrap().colors().map(<[_]>::to_vec)
     };
     assert_eq!(colors("float", ["red", "green", "blue"], "0.25 2 -1"), Some(vec![[0.25, 2.0, -1.0]; 3]));
     assert_eq!(colors("double", ["r", "g", "b"], "0.25 0.5 1"), Some(vec![[0.25, 0.5, 1.0]; 3]));
     assert_eq!(colors("uchar", ["b", "g", "r"], "255 51 0"), Some(vec![[0.0, linear_from_srgb(0.2), 1.0]; 3]));
-    assert_eq!(colors("ushort", ["red", "green", "blue"], "0 13107 65535"), Some(vec![[0.0, linear_from_srgb(0.2), 1.0]; 3]));
+    assert_eq!(
+        colors("ushort", ["red", "green", "blue"], "0 13107 65535"),
+        Some(vec![[0.0, linear_from_srgb(0.2), 1.0]; 3])
+    );
     assert_eq!(colors("uchar", ["red", "green", "alpha"], "255 51 0"), None);
 }

@@ -26,7 +26,11 @@ impl External {
     /// [`Error::Usage`] if it lacks one that `budgets` need.
     pub fn new(name: &str, template: &str, scene: &Path, budgets: &[Budget]) -> Result<Self> {
         let needs = |word: &str, why: &str| {
-            if template.contains(word) { Ok(()) } else { Err(Error::Usage(format!("--external {name}: the command has no {word}, {why}"))) }
+            if template.contains(word) {
+                Ok(())
+            } else {
+                Err(Error::Usage(format!("--external {name}: the command has no {word}, {why}")))
+            }
         };
         needs("{out}", "the EXR file that it shall write")?;
         match budgets.first() {
@@ -96,7 +100,10 @@ impl PrintedStatistics {
         let first = |value: &Value| value.as_f64().or_else(|| value.get(0).and_then(Value::as_f64));
         let seconds = first(&run["render_s"]).or_else(|| first(&run["render_seconds"]));
         let spp = first(&run["eff_spp"]).or_else(|| first(&run["spp"]));
-        Self { seconds: seconds.filter(|s| s.is_finite() && *s > 0.0), spp: spp.filter(|n| *n >= 1.0).map(|n| n.round() as u32) }
+        Self {
+            seconds: seconds.filter(|s| s.is_finite() && *s > 0.0),
+            spp: spp.filter(|n| *n >= 1.0).map(|n| n.round() as u32),
+        }
     }
 }
 
@@ -117,7 +124,11 @@ mod tests {
 
     #[test]
     fn words_of_the_template_are_filled_in_for_the_shell() {
-        let line = external("r {scene} -n{spp} --seed {seed} -o {out}").unwrap().line(Path::new("a b/o.exr"), Budget::Spp(4), 7);
+        let line = external("r {scene} -n{spp} --seed {seed} -o {out}").unwrap().line(
+            Path::new("a b/o.exr"),
+            Budget::Spp(4),
+            7,
+        );
         assert_eq!(line, r"r 'it'\''s/a scene.xml' -n4 --seed 7 -o 'a b/o.exr'");
         let timed = External::new("x", "r {seconds} {out}", Path::new("s"), &[Budget::Seconds(0.5)]).unwrap();
         assert_eq!(timed.line(Path::new("o"), Budget::Seconds(0.5), 7), "r 0.5 'o'");
@@ -125,7 +136,10 @@ mod tests {
             assert!(external(template).unwrap_err().to_string().contains(missing));
         }
         assert!(
-            External::new("x", "r {spp} {out}", Path::new("s"), &[Budget::Seconds(1.0)]).unwrap_err().to_string().contains("{seconds}")
+            External::new("x", "r {spp} {out}", Path::new("s"), &[Budget::Seconds(1.0)])
+                .unwrap_err()
+                .to_string()
+                .contains("{seconds}")
         );
     }
 
@@ -149,7 +163,8 @@ mod tests {
     fn statistics_are_read_from_standard_output() {
         let printed = |seconds, spp| PrintedStatistics { seconds: Some(seconds), spp: Some(spp) };
         assert_eq!(PrintedStatistics::in_text("{\n \"render_seconds\": 1.5,\n \"spp\": 16\n}\n"), printed(1.5, 16));
-        let line = "noise\n{\"load_s\": 1, \"runs\": [{\"render_s\": [9]}, {\"render_s\": [0.25, 0.3], \"eff_spp\": 16.4}]}\n";
+        let line =
+            "noise\n{\"load_s\": 1, \"runs\": [{\"render_s\": [9]}, {\"render_s\": [0.25, 0.3], \"eff_spp\": 16.4}]}\n";
         assert_eq!(PrintedStatistics::in_text(line), printed(0.25, 16));
         assert_eq!(PrintedStatistics::in_text("{}\n{ broken"), PrintedStatistics::default());
         assert_eq!(PrintedStatistics::in_text("Rendering 4 s"), PrintedStatistics::default());

@@ -108,13 +108,23 @@ fn reference(program: &Program, options: &ErrorOptions, watch: &dyn Watch) -> Re
     let Some(budget) = options.largest_budget() else { return Ok(None) };
     let mut halves = Vec::new();
     for half in 0..2 {
-        watch.step(&format!("no reference: half {} of 2, {budget}, {}", half + 1, options.variants.first().map_or("", |v| &v.name)));
-        let Some(measured) = program.render(0, budget, options.seed.wrapping_add(HALVES_SEED + half))? else { return Ok(None) };
+        watch.step(&format!(
+            "no reference: half {} of 2, {budget}, {}",
+            half + 1,
+            options.variants.first().map_or("", |v| &v.name)
+        ));
+        let Some(measured) = program.render(0, budget, options.seed.wrapping_add(HALVES_SEED + half))? else {
+            return Ok(None);
+        };
         halves.push(measured);
     }
     let [a, b] = &halves[..] else { return Ok(None) };
     let (mean, differences) = mean_of_halves(&a.image, &b.image)?;
-    let info = ReferenceInfo { file: None, halves_spp: a.spp.zip(b.spp).map(|(a, b)| a.midpoint(b)), noise_relmse: Some(differences[1]) };
+    let info = ReferenceInfo {
+        file: None,
+        halves_spp: a.spp.zip(b.spp).map(|(a, b)| a.midpoint(b)),
+        noise_relmse: Some(differences[1]),
+    };
     Ok(Some(Reference { image: mean, info, floor: differences }))
 }
 
@@ -141,8 +151,10 @@ fn judge(reference: &Reference, measured: &Measured, name: &str) -> Result<Run> 
             t.width, t.height, r.width, r.height
         )));
     }
-    let Comparison { mse, relmse, relmse_trimmed, mean_ratio, nan, inf, .. } = compare(&reference.image, &measured.image)?;
-    let [mse, relmse, relmse_trimmed] = [mse - reference.floor[0], relmse - reference.floor[1], relmse_trimmed - reference.floor[2]];
+    let Comparison { mse, relmse, relmse_trimmed, mean_ratio, nan, inf, .. } =
+        compare(&reference.image, &measured.image)?;
+    let [mse, relmse, relmse_trimmed] =
+        [mse - reference.floor[0], relmse - reference.floor[1], relmse_trimmed - reference.floor[2]];
     let efficiency = (relmse > 0.0 && measured.seconds > 0.0).then(|| 1.0 / (relmse * measured.seconds));
     Ok(Run {
         repeat: 0,

@@ -21,19 +21,23 @@ const PIXELS: u64 = 12_000_000;
 const VIEWER: &str = include_str!("viewer.js");
 
 const STYLE: &str = "<style>
-#views { display: flex; gap: .5rem; } #views figure { flex: 1; min-width: 0; margin: 0; } #views canvas { cursor: crosshair; touch-action: none; }
-#controls { display: flex; flex-wrap: wrap; gap: .3rem 1rem; align-items: center; margin: .5rem 0; } #pixel { white-space: pre-wrap; }
+#views { display: flex; gap: .5rem; } #views figure { flex: 1; min-width: 0; margin: 0; } \
+#views canvas { cursor: crosshair; touch-action: none; }
+#controls { display: flex; flex-wrap: wrap; gap: .3rem 1rem; align-items: center; margin: .5rem 0; } \
+#pixel { white-space: pre-wrap; }
 [aria-pressed=true] { font-weight: bold; } [hidden] { display: none; }
 </style>\n";
 
 const CONTROLS: &str = "<div id=\"controls\">
 <label>Test <select id=\"choice\"></select></label>
-<span><button data-show=\"all\">side by side (0)</button> <button data-show=\"reference\">reference (1)</button> <button data-show=\"test\">test (2)</button> \
-<button data-show=\"error\">error (3)</button></span>
-<label>Exposure <input id=\"exposure\" type=\"range\" min=\"-10\" max=\"10\" step=\"0.1\" value=\"0\"> <output id=\"exposure-value\"></output></label>
-<label>Error <select id=\"kind\"><option value=\"relative\">relative, squared</option><option value=\"absolute\">absolute</option>\
-<option value=\"signed\">signed: red is brighter</option></select></label>
-<label>times 2^ <input id=\"gain\" type=\"range\" min=\"-10\" max=\"10\" step=\"0.1\" value=\"0\"> <output id=\"gain-value\"></output></label>
+<span><button data-show=\"all\">side by side (0)</button> <button data-show=\"reference\">reference (1)</button> \
+<button data-show=\"test\">test (2)</button> <button data-show=\"error\">error (3)</button></span>
+<label>Exposure <input id=\"exposure\" type=\"range\" min=\"-10\" max=\"10\" step=\"0.1\" value=\"0\"> \
+<output id=\"exposure-value\"></output></label>
+<label>Error <select id=\"kind\"><option value=\"relative\">relative, squared</option>\
+<option value=\"absolute\">absolute</option><option value=\"signed\">signed: red is brighter</option></select></label>
+<label>times 2^ <input id=\"gain\" type=\"range\" min=\"-10\" max=\"10\" step=\"0.1\" value=\"0\"> \
+<output id=\"gain-value\"></output></label>
 <span>Zoom <output id=\"zoom-value\"></output> (wheel, drag, double click)</span>
 </div>
 <div id=\"views\">
@@ -89,7 +93,8 @@ impl Pictures {
             let variant = report.variants.get(variant)?;
             Some(format!("{}, {}", variant.name, variant.points.get(budget)?.budget))
         };
-        let tests = self.tests.iter().map(|(v, b, data)| Test { name: name(*v, *b).unwrap_or_default(), data }).collect();
+        let tests =
+            self.tests.iter().map(|(v, b, data)| Test { name: name(*v, *b).unwrap_or_default(), data }).collect();
         let data = Data { size: self.size, floor: RELATIVE_FLOOR, reference: &self.reference, tests };
         // A name could hold the end of the element that holds the text.
         Ok(serde_json::to_string(&data).map_err(|e| Error::Internal(e.to_string()))?.replace('<', "\\u003c"))
@@ -100,7 +105,8 @@ impl Pictures {
 fn pack(image: &Image) -> String {
     let Some(layer) = image.layer(LayerKind::Color) else { return String::new() };
     let largest = f16::MAX.to_f32();
-    let bits = |x: &f32| f16::from_f32(if x.is_finite() { x.clamp(-largest, largest) } else { *x }).to_bits().to_be_bytes();
+    let bits =
+        |x: &f32| f16::from_f32(if x.is_finite() { x.clamp(-largest, largest) } else { *x }).to_bits().to_be_bytes();
     let values: Vec<[u8; 2]> = layer.pixels().flat_map(|pixel| pixel.iter().take(3).map(bits)).collect();
     let bytes: Vec<u8> = values.iter().map(|v| v[0]).chain(values.iter().map(|v| v[1])).collect();
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
@@ -137,7 +143,8 @@ impl ErrorReport {
         }
         out.push_str("</ul>\n");
         let by_time: Vec<Curve> = self.variants.iter().map(|v| named(&v.name, v.slope_of_time, v.curve())).collect();
-        let by_spp: Vec<Curve> = self.variants.iter().map(|v| named(&v.name, v.slope_of_spp, v.curve_of_spp())).collect();
+        let by_spp: Vec<Curve> =
+            self.variants.iter().map(|v| named(&v.name, v.slope_of_spp, v.curve_of_spp())).collect();
         for (curves, axis, caption) in [
             (by_time, "seconds", "Error against time, medians; the steeper and the further left the better."),
             (by_spp, "samples per pixel", "Error against samples: what sampling alone does."),
@@ -154,7 +161,8 @@ impl ErrorReport {
             let json = self.pictures.json(self)?;
             let _ = write!(
                 out,
-                "<h2>Differences</h2>\n{STYLE}{CONTROLS}<script type=\"application/json\" id=\"pictures\">{json}</script>\n<script>\n{VIEWER}</script>\n"
+                "<h2>Differences</h2>\n{STYLE}{CONTROLS}\
+                 <script type=\"application/json\" id=\"pictures\">{json}</script>\n<script>\n{VIEWER}</script>\n"
             );
         }
         out.push_str(html::END);
@@ -173,7 +181,9 @@ mod tests {
 
     #[test]
     fn base64_is_that_of_the_standard() {
-        for (bytes, text) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foob", "Zm9vYg=="), ("foobar", "Zm9vYmFy")] {
+        for (bytes, text) in
+            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foob", "Zm9vYg=="), ("foobar", "Zm9vYmFy")]
+        {
             assert_eq!(base64(bytes.as_bytes()), text);
         }
     }

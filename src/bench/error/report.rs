@@ -10,8 +10,9 @@ use crate::bench::report::write_files;
 use crate::error::{Error, Result};
 
 /// The columns of the CSV file.
-const COLUMNS: &str = "scene,variant,budget,repeat,seed,spp,seconds,process_seconds,relmse,relmse_trimmed,mse,flip,mean_ratio_r,mean_ratio_g,\
-                       mean_ratio_b,not_finite,msamples_per_second,mrays_per_second,efficiency";
+const COLUMNS: &str = "scene,variant,budget,repeat,seed,spp,seconds,process_seconds,relmse,relmse_trimmed,mse,flip,\
+                       mean_ratio_r,mean_ratio_g,mean_ratio_b,not_finite,msamples_per_second,mrays_per_second,\
+                       efficiency";
 
 impl ErrorReport {
     /// As JSON.
@@ -91,7 +92,12 @@ impl ErrorReport {
     /// Where and how it was measured.
     pub(super) fn header(&self) -> String {
         let cut = if self.interrupted { " Interrupted: what is missing was not measured." } else { "" };
-        format!("{}; `{}`. Medians of {} repeats in turn (lowest to highest).{cut}", self.machine.line(), self.command, self.repeats)
+        format!(
+            "{}; `{}`. Medians of {} repeats in turn (lowest to highest).{cut}",
+            self.machine.line(),
+            self.command,
+            self.repeats
+        )
     }
 
     /// What the columns mean.
@@ -103,9 +109,9 @@ impl ErrorReport {
             (None, Some(noise)) => {
                 let spp = reference.halves_spp.map_or(String::new(), |spp| format!(" of {spp} spp each"));
                 format!(
-                    "No reference was given: the mean of two independent renders{spp} by the first variant stands in. A render like one of them has \
-                     relMSE {} (half of their squared difference); a quarter, {}, is their mean's, and is subtracted from every error. A bias \
-                     that all renders share cannot be seen.",
+                    "No reference was given: the mean of two independent renders{spp} by the first variant stands in. \
+                     A render like one of them has relMSE {} (half of their squared difference); a quarter, {}, is \
+                     their mean's, and is subtracted from every error. A bias that all renders share cannot be seen.",
                     number(2.0 * noise),
                     number(noise)
                 )
@@ -113,13 +119,15 @@ impl ErrorReport {
             (None, None) => "Interrupted before there was a reference.".to_owned(),
         });
         notes.push(
-            "relMSE: mean of (test - reference)² / (reference² + 0.01) over pixels and channels; trimmed: without the worst thousandth of the \
-             pixels. FLIP: mean of HDR-FLIP, first repeat. Mean ratio: luminance of all repeats over the reference's, with a 95 % confidence \
-             interval from the differences of blocks of 8 x 8 pixels. Efficiency: 1 / (relMSE seconds)."
+            "relMSE: mean of (test - reference)² / (reference² + 0.01) over pixels and channels; trimmed: without the \
+             worst thousandth of the pixels. FLIP: mean of HDR-FLIP, first repeat. Mean ratio: luminance of all \
+             repeats over the reference's, with a 95 % confidence interval from the differences of blocks of 8 x 8 \
+             pixels. Efficiency: 1 / (relMSE seconds)."
                 .to_owned(),
         );
         if self.variants.iter().any(|variant| variant.external) {
-            let text = "Other programs: the time that they report of themselves on standard output, else that of their whole process.";
+            let text = "Other programs: the time that they report of themselves on standard output, else that of their \
+                        whole process.";
             notes.push(text.to_owned());
         }
         notes
@@ -181,12 +189,18 @@ impl ErrorReport {
             }
             row
         });
-        Table { title: "Convergence (least squares of the logarithms; -1: independent samples)".into(), heads, rows: rows.collect() }
+        Table {
+            title: "Convergence (least squares of the logarithms; -1: independent samples)".into(),
+            heads,
+            rows: rows.collect(),
+        }
     }
 }
 
 fn tax(tax: &TaxReport) -> Table {
-    let heads = ["variant", "picture", "rays", "threads", "render s", "bare replay s", "render / replay"].map(str::to_owned).to_vec();
+    let heads = ["variant", "picture", "rays", "threads", "render s", "bare replay s", "render / replay"]
+        .map(str::to_owned)
+        .to_vec();
     let [width, height] = tax.size;
     let same = if tax.same_hits { "" } else { " (the replay found other hits)" };
     let row = vec![
@@ -198,7 +212,10 @@ fn tax(tax: &TaxReport) -> Table {
         range(tax.replay_seconds),
         range(tax.ratio),
     ];
-    let title = format!("Shading tax: the render beside bare calls of {} with its own rays, in the same packets", tax.accelerator);
+    let title = format!(
+        "Shading tax: the render beside bare calls of {} with its own rays, in the same packets",
+        tax.accelerator
+    );
     Table { title, heads, rows: vec![row] }
 }
 
@@ -213,7 +230,9 @@ fn row(name: &str, point: &Point) -> Vec<String> {
         number(point.relmse_trimmed[0]),
         number(point.mse[0]),
         point.flip.map_or_else(|| "-".into(), number),
-        point.bias.map_or_else(|| "-".into(), |bias| format!("{:.4} ({:.4} to {:.4})", bias.ratio, bias.low, bias.high)),
+        point
+            .bias
+            .map_or_else(|| "-".into(), |bias| format!("{:.4} ({:.4} to {:.4})", bias.ratio, bias.low, bias.high)),
         point.not_finite.to_string(),
         optional(point.msamples_per_second),
         optional(point.mrays_per_second),

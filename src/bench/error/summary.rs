@@ -206,8 +206,10 @@ impl VariantReport {
 
     fn curve_over(&self, of: impl Fn(&Point) -> Option<f64>) -> Vec<(f64, f64)> {
         let measured = self.points.iter().filter(|point| !point.runs.is_empty());
-        let mut curve: Vec<_> =
-            measured.filter_map(|point| Some((of(point)?, point.relmse[0]))).filter(|(x, y)| *x > 0.0 && *y > 0.0).collect();
+        let mut curve: Vec<_> = measured
+            .filter_map(|point| Some((of(point)?, point.relmse[0])))
+            .filter(|(x, y)| *x > 0.0 && *y > 0.0)
+            .collect();
         curve.sort_by(|a, b| a.0.total_cmp(&b.0));
         curve
     }

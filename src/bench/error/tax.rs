@@ -71,7 +71,12 @@ pub(super) fn subject(options: &ErrorOptions) -> Result<(&str, &Settings, Embree
 ///
 /// # Errors
 /// If there is no such variant, or as a render.
-pub(super) fn bench_tax(scene: &Scene, options: &ErrorOptions, watch: &dyn Watch, stop: &AtomicBool) -> Result<Option<TaxReport>> {
+pub(super) fn bench_tax(
+    scene: &Scene,
+    options: &ErrorOptions,
+    watch: &dyn Watch,
+    stop: &AtomicBool,
+) -> Result<Option<TaxReport>> {
     let (name, settings, embree) = subject(options)?;
     watch.step(&format!("tax: recording the rays of {name}"));
     let accel = EmbreeAccel::with_options(&scene.geometry, settings.threads, embree)?;

@@ -94,12 +94,16 @@ fn pages_hold_names_that_are_markup() {
     assert!(report.pictures.fit(10) && !Pictures::new(&picture([4000, 1], |_| 0.0)).fit(3000));
     report.pictures.add(0, 1, &image);
     for budget in 0..2 {
-        let run = judge(&against(image.clone(), [0.0; 3]), &measured(picture([2, 2], |i| i as f32 + 1.0), 1.0), name).unwrap();
+        let run = judge(&against(image.clone(), [0.0; 3]), &measured(picture([2, 2], |i| i as f32 + 1.0), 1.0), name)
+            .unwrap();
         report.add(0, budget, run);
     }
     report.summarize(&[vec![Blocks::default(), Blocks::default()]]);
     let html = report.html().unwrap();
-    assert!(html.contains("a&lt;b&gt;&amp;&quot;") && html.matches("</script>").count() == 2 && !html.contains("<b>&\""), "{html}");
+    assert!(
+        html.contains("a&lt;b&gt;&amp;&quot;") && html.matches("</script>").count() == 2 && !html.contains("<b>&\""),
+        "{html}"
+    );
     assert!(html.contains("\\u003c/script>, 4 spp"));
     assert!(report.csv().contains("\"a<b>&\"\"</script>\"") && report.markdown().contains("| 4 spp |"));
 }

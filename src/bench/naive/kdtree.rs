@@ -44,8 +44,9 @@ impl Node {
         let mut lower: Vec<f32> = triangles.iter().map(|prim| all[*prim as usize].min[axis]).collect();
         lower.sort_by(f32::total_cmp);
         let split = lower[lower.len() / 2];
-        let pick =
-            |keep: &dyn Fn(&Aabb) -> bool| -> Vec<u32> { triangles.iter().copied().filter(|prim| keep(&all[*prim as usize])).collect() };
+        let pick = |keep: &dyn Fn(&Aabb) -> bool| -> Vec<u32> {
+            triangles.iter().copied().filter(|prim| keep(&all[*prim as usize])).collect()
+        };
         let (left, right) = (pick(&|b| b.min[axis] <= split), pick(&|b| b.max[axis] > split));
         // No progress along this axis ends it all.
         if left.len() == triangles.len() || right.len() == triangles.len() {

@@ -43,10 +43,13 @@ impl Cell {
         let center = bounds.center();
         let child = |octant: usize| {
             let upper = [1, 2, 4].map(|bit| octant & bit != 0);
-            let pick = |axis: usize| if upper[axis] { [center[axis], bounds.max[axis]] } else { [bounds.min[axis], center[axis]] };
+            let pick = |axis: usize| {
+                if upper[axis] { [center[axis], bounds.max[axis]] } else { [bounds.min[axis], center[axis]] }
+            };
             let sides = [pick(0), pick(1), pick(2)];
             let cell = Aabb { min: Vec3::from(sides.map(|s| s[0])), max: Vec3::from(sides.map(|s| s[1])) };
-            let inside: Vec<u32> = triangles.iter().copied().filter(|prim| overlap(&all[*prim as usize], &cell)).collect();
+            let inside: Vec<u32> =
+                triangles.iter().copied().filter(|prim| overlap(&all[*prim as usize], &cell)).collect();
             (!inside.is_empty()).then(|| Box::new(Self::new(all, cell, inside, depth + 1)))
         };
         Self { bounds, triangles: Vec::new(), children: std::array::from_fn(child) }

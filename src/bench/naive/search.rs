@@ -29,7 +29,9 @@ impl<'g> Search<'g> {
     pub fn test(&mut self, prim: u32) {
         self.tests += 1;
         let key = self.geometry.cutouts.key(&self.ray);
-        let Some(hit) = self.geometry.intersect_prim(&self.ray, key, self.shape, PrimId(prim), Hit::NO_INSTANCE) else { return };
+        let Some(hit) = self.geometry.intersect_prim(&self.ray, key, self.shape, PrimId(prim), Hit::NO_INSTANCE) else {
+            return;
+        };
         if self.best.is_none_or(|best| hit.is_before(&best)) {
             self.best = Some(hit);
             self.ray.t_max = hit.t.next_up().min(self.ray.t_max);
@@ -40,7 +42,8 @@ impl<'g> Search<'g> {
     pub fn meets(&self, bounds: &Aabb) -> bool {
         let (origin, direction) = (self.ray.origin.as_dvec3(), self.ray.direction.as_dvec3());
         // A float's roundoff of the largest coordinate hides the f64 roundings of this test and of the triangle's.
-        let slack = UNIT_ROUNDOFF * (origin.abs().max_element() + bounds.min.abs().max(bounds.max.abs()).as_dvec3().max_element());
+        let slack = UNIT_ROUNDOFF
+            * (origin.abs().max_element() + bounds.min.abs().max(bounds.max.abs()).as_dvec3().max_element());
         let (low, high) = (bounds.min.as_dvec3() - slack, bounds.max.as_dvec3() + slack);
         let (mut enter, mut leave) = (f64::from(self.ray.t_min), f64::from(self.ray.t_max));
         for axis in 0..3 {

@@ -11,8 +11,9 @@ pub fn field(text: &str) -> String {
 
 pub fn write(report: &Report) -> String {
     let mut out = String::from(
-        "scene,primitives,accelerator,description,ray_kind,rays,mode,threads,mrays_per_second_median,mrays_per_second_min,\
-         mrays_per_second_max,nodes_per_ray,prims_per_ray,build_ms_all_threads,bytes,identical,within_bound,ties,different\n",
+        "scene,primitives,accelerator,description,ray_kind,rays,mode,threads,mrays_per_second_median,\
+         mrays_per_second_min,mrays_per_second_max,nodes_per_ray,prims_per_ray,build_ms_all_threads,bytes,identical,\
+         within_bound,ties,different\n",
     );
     for scene in &report.scenes {
         for accel in &scene.accels {

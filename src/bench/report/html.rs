@@ -18,19 +18,26 @@ table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size
 th, td { padding: .25rem .6rem; border-bottom: 1px solid var(--line); text-align: left; white-space: nowrap; }
 th { position: sticky; top: 0; background: Canvas; }
 td:not(:first-child) { font-variant-numeric: tabular-nums; }
-figure { margin: 1rem 0; } svg { max-width: 100%; height: auto; border-radius: 6px; } figcaption { opacity: .8; font-size: 13px; }
+figure { margin: 1rem 0; } svg { max-width: 100%; height: auto; border-radius: 6px; } \
+figcaption { opacity: .8; font-size: 13px; }
 code { overflow-wrap: anywhere; }";
 
 /// Text with the characters of markup, and those that nobody sees, written out.
 pub fn escape(text: &str) -> String {
-    printable::lines(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;").replace('\'', "&#39;")
+    printable::lines(text)
+        .replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+        .replace('\'', "&#39;")
 }
 
 /// A page down to the line with the machine of the measurement.
 pub fn begin(title: &str, header: &str) -> String {
     format!(
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
-         content=\"width=device-width\">\n<title>{title}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n<p>{}</p>\n",
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width\">\n<title>{title}</title>\n<style>{STYLE}</style>\n\
+         </head>\n<body>\n<h1>{title}</h1>\n<p>{}</p>\n",
         escape(header)
     )
 }
@@ -49,12 +56,22 @@ pub fn write(report: &Report) -> Result<String> {
             name: format!("{name} (slope {slope:.2})"),
             points: scaling.points.iter().filter(|p| p.accel == name).map(|p| (p.triangles as f64, cost(p))).collect(),
         };
-        let slope = |name: &str| scaling.slopes.iter().find(|(n, ..)| n == name).map_or((0.0, 0.0), |(_, rays, builds)| (*rays, *builds));
+        let slope = |name: &str| {
+            scaling.slopes.iter().find(|(n, ..)| n == name).map_or((0.0, 0.0), |(_, rays, builds)| (*rays, *builds))
+        };
         let of_rays: Vec<_> = names.iter().map(|name| curve(name, slope(name).0, |p| p.nanoseconds_per_ray)).collect();
         let of_builds: Vec<_> = names.iter().map(|name| curve(name, slope(name).1, |p| p.build_milliseconds)).collect();
         out.push_str("<h2>Growth</h2>\n");
-        figure(&mut out, &plot::curves(&of_rays, "triangles", "ns per ray", &[])?, "Time per ray, incoherent rays, one thread.");
-        figure(&mut out, &plot::curves(&of_builds, "triangles", "ms to build", &[])?, "Time to build with all threads.");
+        figure(
+            &mut out,
+            &plot::curves(&of_rays, "triangles", "ns per ray", &[])?,
+            "Time per ray, incoherent rays, one thread.",
+        );
+        figure(
+            &mut out,
+            &plot::curves(&of_builds, "triangles", "ms to build", &[])?,
+            "Time to build with all threads.",
+        );
         add_table(&mut out, &table);
     }
     out.push_str(END);
@@ -65,7 +82,11 @@ fn add_scene(out: &mut String, scene: &SceneReport) -> Result<()> {
     let _ = write!(out, "<h2>{}</h2>\n<p>{}</p>\n", escape(&scene.scene), escape(&markdown::scene_line(scene)));
     let kinds: Vec<RayKind> = scene.rays.iter().map(|(kind, _)| *kind).collect();
     let groups: Vec<&str> = kinds.iter().map(|kind| kind.name()).collect();
-    figure(out, &plot::bars(&groups, &rates(scene, &kinds), "Mrays/s")?, "One thread; whiskers from the lowest to the highest round.");
+    figure(
+        out,
+        &plot::bars(&groups, &rates(scene, &kinds), "Mrays/s")?,
+        "One thread; whiskers from the lowest to the highest round.",
+    );
     for kind in [RayKind::FirstBounce, RayKind::Camera] {
         if let Some((svg, caption)) = break_even(scene, kind)? {
             figure(out, &svg, &caption);
@@ -98,7 +119,8 @@ fn rates(scene: &SceneReport, kinds: &[RayKind]) -> Vec<Series> {
             };
             let values: Vec<_> = kinds.iter().map(value).collect();
             if values.iter().any(Option::is_some) {
-                let name = if mode == Mode::Single { accel.name.clone() } else { format!("{}, {}", accel.name, mode.name()) };
+                let name =
+                    if mode == Mode::Single { accel.name.clone() } else { format!("{}, {}", accel.name, mode.name()) };
                 series.push(Series { name, values });
             }
         }
@@ -113,8 +135,9 @@ fn break_even(scene: &SceneReport, kind: RayKind) -> Result<Option<(String, Stri
     for accel in &scene.accels {
         let build = accel.builds.iter().find(|b| b.threads == 1).map(|b| b.milliseconds[0] * 1e-3);
         let report = accel.kinds.iter().find(|k| k.kind == kind);
-        let rate =
-            report.and_then(|k| k.rates.iter().find(|r| r.mode == Mode::Single && r.threads == 1)).map(|r| r.mrays_per_second[0] * 1e6);
+        let rate = report
+            .and_then(|k| k.rates.iter().find(|r| r.mode == Mode::Single && r.threads == 1))
+            .map(|r| r.mrays_per_second[0] * 1e6);
         if let (Some(build), Some(rate)) = (build, rate.filter(|r| *r > 0.0)) {
             lines.push((accel.name.clone(), Cost { build, per_ray: 1.0 / rate }));
         }
@@ -172,7 +195,9 @@ pub fn figure(out: &mut String, svg: &str, caption: &str) {
 
 /// Adds a table below its title.
 pub fn add_table(out: &mut String, table: &Table) {
-    let cells = |tag: &str, row: &[String]| row.iter().map(|cell| format!("<{tag}>{}</{tag}>", escape(cell))).collect::<String>();
+    let cells = |tag: &str, row: &[String]| {
+        row.iter().map(|cell| format!("<{tag}>{}</{tag}>", escape(cell))).collect::<String>()
+    };
     let _ = write!(
         out,
         "<h3>{}</h3>\n<div class=\"wide\"><table>\n<thead><tr>{}</tr></thead>\n<tbody>\n",
@@ -192,16 +217,28 @@ mod tests {
     #[test]
     fn text_is_no_markup() {
         let strange = "</title><script>alert('x')</script>\" onload=\"&\u{1b}";
-        assert_eq!(escape(strange), "&lt;/title&gt;&lt;script&gt;alert(&#39;x&#39;)&lt;/script&gt;&quot; onload=&quot;&amp;\\u001b");
+        assert_eq!(
+            escape(strange),
+            "&lt;/title&gt;&lt;script&gt;alert(&#39;x&#39;)&lt;/script&gt;&quot; onload=&quot;&amp;\\u001b"
+        );
         let mut page = begin(&escape(strange), strange);
         let table = Table { title: strange.into(), heads: vec![strange.into()], rows: vec![vec![strange.into()]] };
         add_table(&mut page, &table);
         figure(
             &mut page,
-            &plot::curves(&[Curve { name: strange.into(), points: vec![(1.0, 2.0), (2.0, 3.0)] }], strange, strange, &[]).unwrap(),
+            &plot::curves(
+                &[Curve { name: strange.into(), points: vec![(1.0, 2.0), (2.0, 3.0)] }],
+                strange,
+                strange,
+                &[],
+            )
+            .unwrap(),
             strange,
         );
-        assert!(!page.contains("<script") && !page.contains("onload=\"") && page.matches("</title>").count() == 1, "{page}");
+        assert!(
+            !page.contains("<script") && !page.contains("onload=\"") && page.matches("</title>").count() == 1,
+            "{page}"
+        );
     }
 
     #[test]

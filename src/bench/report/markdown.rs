@@ -44,7 +44,8 @@ pub fn header(report: &Report) -> String {
 pub fn scene_line(scene: &SceneReport) -> String {
     let rays: Vec<_> = scene.rays.iter().map(|(kind, count)| format!("{count} {}", kind.name())).collect();
     let absent: Vec<_> = scene.absent.iter().map(|kind| kind.name()).collect();
-    let absent = if absent.is_empty() { String::new() } else { format!("; the scene has no {} rays", absent.join(" and no ")) };
+    let absent =
+        if absent.is_empty() { String::new() } else { format!("; the scene has no {} rays", absent.join(" and no ")) };
     let cut = if scene.interrupted { " Interrupted: what is missing was not measured." } else { "" };
     format!(
         "{} primitives, {} instances. Rays: {}{absent}. Answers compared with: {}.{cut}",
@@ -102,14 +103,20 @@ fn work(scene: &SceneReport) -> Table {
         std::iter::once(accel.name.clone()).chain(cells).collect()
     });
     let names = std::iter::once("accelerator").chain(kinds.iter().map(|kind| kind.name()));
-    Table { title: "Nodes + primitives per ray".into(), heads: names.map(str::to_owned).collect(), rows: rows.collect() }
+    Table {
+        title: "Nodes + primitives per ray".into(),
+        heads: names.map(str::to_owned).collect(),
+        rows: rows.collect(),
+    }
 }
 
 fn structures(scene: &SceneReport) -> Table {
     let row = |accel: &AccelReport| {
         let per_prim = |bytes: f64| format!("{:.1}", bytes / scene.primitives.max(1) as f64);
-        let builds =
-            accel.builds.iter().map(|b| format!("{:.1} ({} threads, {:.2} Mprims/s)", b.milliseconds[0], b.threads, b.mprims_per_second));
+        let builds = accel
+            .builds
+            .iter()
+            .map(|b| format!("{:.1} ({} threads, {:.2} Mprims/s)", b.milliseconds[0], b.threads, b.mprims_per_second));
         let mut cells = vec![
             accel.name.clone(),
             accel.description.clone(),
@@ -157,7 +164,15 @@ fn agreement(scene: &SceneReport) -> Table {
             [accel.name.clone(), kind.kind.name().to_owned()].into_iter().chain(counts).collect()
         })
     });
-    let names = ["accelerator", "rays", "compared", "identical", "same primitive within the bound", "tie within the bound", "different"];
+    let names = [
+        "accelerator",
+        "rays",
+        "compared",
+        "identical",
+        "same primitive within the bound",
+        "tie within the bound",
+        "different",
+    ];
     Table { title: "Agreement".into(), heads: heads(&names), rows: rows.collect() }
 }
 
@@ -168,7 +183,10 @@ pub fn disagreements(scene: &SceneReport) -> Vec<String> {
         for kind in &accel.kinds {
             for d in &kind.agreement.first {
                 let name = kind.kind.name();
-                lines.push(format!("{}, {name}: expected {}, found {}; replay with `--ray={}`", accel.name, d.expected, d.found, d.ray));
+                lines.push(format!(
+                    "{}, {name}: expected {}, found {}; replay with `--ray={}`",
+                    accel.name, d.expected, d.found, d.ray
+                ));
             }
         }
     }
@@ -180,7 +198,8 @@ pub fn scaling(report: &Report) -> Option<Table> {
     let scaling = report.scaling.as_ref()?;
     let slope = |name: &str| scaling.slopes.iter().find(|(n, ..)| n == name);
     let rows = scaling.points.iter().map(|p| {
-        let slopes = slope(&p.accel).map_or_else(Default::default, |(_, rays, builds)| [format!("{rays:.3}"), format!("{builds:.3}")]);
+        let slopes = slope(&p.accel)
+            .map_or_else(Default::default, |(_, rays, builds)| [format!("{rays:.3}"), format!("{builds:.3}")]);
         let cells = [
             p.accel.clone(),
             p.triangles.to_string(),
@@ -190,13 +209,23 @@ pub fn scaling(report: &Report) -> Option<Table> {
         ];
         cells.into_iter().chain(slopes).collect()
     });
-    let names = ["accelerator", "triangles", "build ms", "ns per ray", "bytes per triangle", "slope of rays", "slope of builds"];
+    let names = [
+        "accelerator",
+        "triangles",
+        "build ms",
+        "ns per ray",
+        "bytes per triangle",
+        "slope of rays",
+        "slope of builds",
+    ];
     Some(Table { title: "Cost over the number of triangles".into(), heads: heads(&names), rows: rows.collect() })
 }
 
 /// Adds a table below its title.
 pub fn add(out: &mut String, table: &Table) {
-    let line = |cells: &[String]| format!("| {} |\n", cells.iter().map(|c| c.replace('|', "\\|")).collect::<Vec<_>>().join(" | "));
+    let line = |cells: &[String]| {
+        format!("| {} |\n", cells.iter().map(|c| c.replace('|', "\\|")).collect::<Vec<_>>().join(" | "))
+    };
     let _ = write!(out, "\n{}\n\n{}|{}\n", table.title, line(&table.heads), "---|".repeat(table.heads.len()));
     for row in &table.rows {
         out.push_str(&line(row));

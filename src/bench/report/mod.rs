@@ -58,7 +58,12 @@ impl Report {
     /// # Errors
     /// [`Error::Output`] naming the file.
     pub fn write_to(&self, folder: &Path) -> Result<()> {
-        let files = [("accel.json", self.json()?), ("accel.csv", self.csv()), ("accel.md", self.markdown()), ("accel.html", self.html()?)];
+        let files = [
+            ("accel.json", self.json()?),
+            ("accel.csv", self.csv()),
+            ("accel.md", self.markdown()),
+            ("accel.html", self.html()?),
+        ];
         write_files(folder, &files)
     }
 }

@@ -51,6 +51,13 @@ pub fn log_bars(groups: &[&str], series: &[Series], unit: &str) -> Result<String
     bars_over(groups, &series.iter().map(log).collect::<Vec<_>>(), unit, |v| 10f64.powf(v))
 }
 
+/// The name of the group in whose middle `x` is; nothing beside the middles.
+fn group_at(groups: &[&str], x: f64) -> String {
+    let is_middle = (x - x.round()).abs() < 1e-6 && x > -0.25;
+    let name = if is_middle { groups.get(x.round() as usize) } else { None };
+    name.map_or(String::new(), |name| (*name).to_owned())
+}
+
 /// Bars whose axis is labelled by a function of their values.
 fn bars_over(groups: &[&str], series: &[Series], unit: &str, label: fn(f64) -> f64) -> Result<String> {
     let ends = || series.iter().flat_map(|s| s.values.iter().flatten());
@@ -68,16 +75,12 @@ fn bars_over(groups: &[&str], series: &[Series], unit: &str, label: fn(f64) -> f
             .y_label_area_size(64)
             .build_cartesian_2d(-0.5..last, bottom..top)
             .map_err(failed)?;
-        let name = |x: &f64| {
-            let near = (x - x.round()).abs() < 1e-6 && *x > -0.25;
-            if near { groups.get(x.round() as usize).map_or(String::new(), |name| (*name).to_owned()) } else { String::new() }
-        };
         let labels = 2 * groups.len() + 1;
         chart
             .configure_mesh()
             .disable_x_mesh()
             .x_labels(labels)
-            .x_label_formatter(&name)
+            .x_label_formatter(&|x| group_at(groups, *x))
             .y_label_formatter(&|y| short(label(*y)))
             .y_desc(unit)
             .label_style(("sans-serif", 14))
@@ -90,7 +93,11 @@ fn bars_over(groups: &[&str], series: &[Series], unit: &str, label: fn(f64) -> f
             let left = |group: usize| group as f64 - 0.42 + width * i as f64;
             let present = || s.values.iter().enumerate().filter_map(|(group, value)| value.map(|v| (left(group), v)));
             chart
-                .draw_series(present().map(|(x, v)| Rectangle::new([(x + 0.06 * width, 0.0), (x + 0.94 * width, v[0])], color.filled())))
+                .draw_series(
+                    present().map(|(x, v)| {
+                        Rectangle::new([(x + 0.06 * width, 0.0), (x + 0.94 * width, v[0])], color.filled())
+                    }),
+                )
                 .map_err(failed)?
                 .label(&s.name)
                 .legend(move |(x, y)| Rectangle::new([(x, y - 5), (x + 12, y + 5)], color.filled()));
@@ -120,7 +127,8 @@ fn color(name: &str, nth: usize) -> RGBAColor {
 pub fn curves(curves: &[Curve], x_label: &str, y_label: &str, marks: &[(f64, f64)]) -> Result<String> {
     let all = || curves.iter().flat_map(|c| &c.points);
     let range = |of: fn(&(f64, f64)) -> f64| {
-        let (low, high) = all().map(of).filter(|v| *v > 0.0).fold((f64::INFINITY, 0.0), |(low, high), v| (v.min(low), v.max(high)));
+        let (low, high) =
+            all().map(of).filter(|v| *v > 0.0).fold((f64::INFINITY, 0.0), |(low, high), v| (v.min(low), v.max(high)));
         if low < high { labelled(low * 0.9, high * 1.1) } else { 0.1..10.0 }
     };
     let mut svg = String::new();

@@ -45,9 +45,11 @@ impl ReportsReport {
     pub fn html(&self) -> Result<String> {
         let mut out = html::begin(TITLE, &header(self));
         for comparison in &self.comparisons {
-            let _ = write!(out, "<h2>{}</h2>\n<p>Reported: {}</p>\n", escape(comparison.title), escape(comparison.claim));
+            let _ =
+                write!(out, "<h2>{}</h2>\n<p>Reported: {}</p>\n", escape(comparison.title), escape(comparison.claim));
             add_list(&mut out, &comparison.sources);
-            let caption = "How many times faster than the first accelerator, within the accelerator, on a logarithmic axis.";
+            let caption =
+                "How many times faster than the first accelerator, within the accelerator, on a logarithmic axis.";
             figure(&mut out, &ratios(comparison)?, caption);
             add_table(&mut out, &table(comparison));
             add_list(&mut out, &comparison.reasons);
@@ -61,7 +63,10 @@ impl ReportsReport {
     /// # Errors
     /// [`Error::Output`] naming the file.
     pub fn write_to(&self, folder: &Path) -> Result<()> {
-        write_files(folder, &[("reports.json", self.json()?), ("reports.md", self.markdown()), ("reports.html", self.html()?)])
+        write_files(
+            folder,
+            &[("reports.json", self.json()?), ("reports.md", self.markdown()), ("reports.html", self.html()?)],
+        )
     }
 }
 
@@ -70,8 +75,9 @@ fn header(report: &ReportsReport) -> String {
     let load = m.load.map_or(String::new(), |load| format!(", load {load:.2} before"));
     let [width, height] = report.size;
     format!(
-        "{} ({}{load}), steradian {}. Frames of {width}x{height}, one sample a pixel, one thread: pictures of normals (one camera ray a pixel), and path \
-         tracing of the mesh on a floor under a sky and a sun (up to 5 segments, shadow rays). Medians of frames in turn.",
+        "{} ({}{load}), steradian {}. Frames of {width}x{height}, one sample a pixel, one thread: pictures of normals \
+         (one camera ray a pixel), and path tracing of the mesh on a floor under a sky and a sun (up to 5 segments, \
+         shadow rays). Medians of frames in turn.",
         m.processor, m.instruction_set, m.version
     )
 }
@@ -88,10 +94,15 @@ fn times_faster(comparison: &Comparison, accel_seconds: fn(&ComparisonRow) -> f6
 }
 
 fn ratios(comparison: &Comparison) -> Result<String> {
-    let kinds = [times_faster(comparison, |row| row.normals.accel_seconds), times_faster(comparison, |row| row.paths.accel_seconds)];
+    let kinds = [
+        times_faster(comparison, |row| row.normals.accel_seconds),
+        times_faster(comparison, |row| row.paths.accel_seconds),
+    ];
     let bar = |ratio: f64| Some([ratio; 3]).filter(|_| ratio.is_finite() && ratio > 0.0);
-    let series =
-        |(i, row): (usize, &ComparisonRow)| Series { name: row.name.clone(), values: kinds.iter().map(|kind| bar(kind[i])).collect() };
+    let series = |(i, row): (usize, &ComparisonRow)| Series {
+        name: row.name.clone(),
+        values: kinds.iter().map(|kind| bar(kind[i])).collect(),
+    };
     let series: Vec<_> = comparison.rows.iter().enumerate().map(series).collect();
     plot::log_bars(&["normals", "path traced"], &series, "times faster")
 }
@@ -110,8 +121,10 @@ fn table(comparison: &Comparison) -> Table {
         "triangles per ray",
         "different pixels",
     ];
-    let [of_normals, of_paths] =
-        [times_faster(comparison, |row| row.normals.accel_seconds), times_faster(comparison, |row| row.paths.accel_seconds)];
+    let [of_normals, of_paths] = [
+        times_faster(comparison, |row| row.normals.accel_seconds),
+        times_faster(comparison, |row| row.paths.accel_seconds),
+    ];
     let rows = comparison.rows.iter().enumerate().map(|(i, row)| {
         let frame = |timing: &crate::bench::FrameTiming| {
             let scaled = timing.scaled_from.map_or(String::new(), |[w, h]| format!(", from {w}x{h}"));
@@ -132,8 +145,8 @@ fn table(comparison: &Comparison) -> Table {
         ]
     });
     let title = format!(
-        "{} triangles; times faster: the first line's time within the accelerator over this one's; triangles per ray and different pixels are of \
-         normals.",
+        "{} triangles; times faster: the first line's time within the accelerator over this one's; triangles per ray \
+         and different pixels are of normals.",
         comparison.triangles
     );
     Table { title, heads: heads.map(str::to_owned).to_vec(), rows: rows.collect() }

@@ -40,7 +40,9 @@ impl Kind {
 
     fn scene(self, mesh: &Mesh) -> serde_json::Value {
         let mut scene = json!({
-            "camera": { "position": [0.9, -4.2, 0.6], "look_at": [0, 0, 0], "up": [0, 0, 1], "vertical_fov_degrees": 35 },
+            "camera": {
+                "position": [0.9, -4.2, 0.6], "look_at": [0, 0, 0], "up": [0, 0, 1], "vertical_fov_degrees": 35
+            },
             "integrator": { "type": "normal" },
             "sampler": { "type": "independent", "spp": 1 },
             "shapes": [{ "type": "mesh", "positions": mesh.positions(), "triangles": mesh.triangles() }],
@@ -78,7 +80,12 @@ pub struct Found {
 
 /// Renders a frame on one thread; the seconds of the render, and its picture.
 fn frame(desc: &SceneDesc, scene: &Scene, size: [u32; 2], accel: &dyn Accelerator) -> Result<(f64, Image)> {
-    let overrides = Overrides { size: Some(size), threads: Some(1), default_outputs: vec!["unused.png".into()], ..Overrides::default() };
+    let overrides = Overrides {
+        size: Some(size),
+        threads: Some(1),
+        default_outputs: vec!["unused.png".into()],
+        ..Overrides::default()
+    };
     let result = render::render(scene, accel, &Settings::new(desc, &overrides)?, &Silent, &AtomicBool::new(false))?;
     Ok((result.stats.render_seconds, result.image))
 }
@@ -135,7 +142,8 @@ pub fn measure(comparison: FrameBenchmark, kind: Kind) -> Result<Vec<Found>> {
             if round == 0 {
                 different[i] = different_pixels(&image, &pictures[which]);
                 let step = (timed.rays.len() / COUNTED).max(1);
-                let counts: Option<Vec<f64>> = timed.rays.iter().step_by(step).map(|ray| (subject.tests)(&*subject.accel, ray)).collect();
+                let counts: Option<Vec<f64>> =
+                    timed.rays.iter().step_by(step).map(|ray| (subject.tests)(&*subject.accel, ray)).collect();
                 tests[i] = counts.map(|counts| counts.iter().sum::<f64>() / counts.len().max(1) as f64);
             }
         }

@@ -62,7 +62,8 @@ pub fn bench_scale(
 fn in_a_process(mut program: Command, case: &Case, stop: &AtomicBool) -> Result<Option<Measured>> {
     let failed = |message: String| Error::Internal(message);
     let case = serde_json::to_string(case).map_err(|e| failed(e.to_string()))?;
-    let Some(Ended { status, stdout, stderr, .. }) = child::run(&mut program, Some(&case), stop).map_err(failed)? else {
+    let Some(Ended { status, stdout, stderr, .. }) = child::run(&mut program, Some(&case), stop).map_err(failed)?
+    else {
         return Ok(None);
     };
     if !status.success() {
@@ -95,9 +96,10 @@ mod tests {
 
     #[test]
     fn a_case_that_fails_is_named_once_and_the_others_are_measured() {
-        let case = r#"{ "triangles": 1, "instances": 0, "lights": 1, "make_seconds": 1, "load_seconds": 1, "build_seconds": 1,
-            "first_pass_seconds": 1, "render_seconds": 2, "processor_seconds": 3, "samples": 1000, "rays": 5000, "mesh_bytes": 1,
-            "accelerator_bytes": 1, "film_bytes_per_pixel": 36, "memory": null }"#;
+        let case = r#"{ "triangles": 1, "instances": 0, "lights": 1, "make_seconds": 1, "load_seconds": 1,
+            "build_seconds": 1, "first_pass_seconds": 1, "render_seconds": 2, "processor_seconds": 3,
+            "samples": 1000, "rays": 5000, "mesh_bytes": 1, "accelerator_bytes": 1, "film_bytes_per_pixel": 36,
+            "memory": null }"#;
         // In the place of the program: it fails with four segments.
         let script = format!("if grep -q '\"depth\":4'; then echo no memory >&2; exit 33; fi; echo '{case}'");
         let program = || {
@@ -107,11 +109,16 @@ mod tests {
         };
         let report = bench_scale(&options("depth"), program, &Unwatched, &AtomicBool::new(false), |_| Ok(())).unwrap();
         let failures = report.failures();
-        assert!(failures.len() == 1 && failures[0].starts_with("depth 4: ") && failures[0].ends_with("no memory"), "{failures:?}");
+        assert!(
+            failures.len() == 1 && failures[0].starts_with("depth 4: ") && failures[0].ends_with("no memory"),
+            "{failures:?}"
+        );
         assert!(!report.interrupted && report.markdown().contains("Failed: depth 4"));
         let runs: Vec<usize> = report.sweeps[0].points.iter().map(|point| point.runs.len()).collect();
         assert_eq!(runs, [2, 2, 0, 2, 2, 2]);
-        assert!(report.sweeps[0].slopes.iter().all(|law| law.fit.slope.abs() < 1e-12 && law.fit.standard_error.is_some()));
+        assert!(
+            report.sweeps[0].slopes.iter().all(|law| law.fit.slope.abs() < 1e-12 && law.fit.standard_error.is_some())
+        );
     }
 
     #[test]

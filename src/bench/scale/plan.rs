@@ -207,7 +207,10 @@ impl Planner<'_> {
                     Q::Peak,
                 ],
                 &[Q::Load, Q::Build, Q::FirstPixel, Q::Sample, Q::Accel, Q::Peak],
-                counts(1_000, options.triangles).into_iter().map(|n| plain(n, self.with(Subject::Sphere { triangles: n }))).collect(),
+                counts(1_000, options.triangles)
+                    .into_iter()
+                    .map(|n| plain(n, self.with(Subject::Sphere { triangles: n })))
+                    .collect(),
             ),
             "instances" => {
                 let triangles = INSTANCED[usize::from(!options.quick)];
@@ -225,7 +228,10 @@ impl Planner<'_> {
                 format!("Emissive triangles above a floor, {picture}"),
                 &[Q::Load, Q::Build, Q::FirstPixel, Q::Sample, Q::Rate, Q::Peak],
                 &[Q::Load, Q::FirstPixel, Q::Sample, Q::Peak],
-                counts(1, options.lights).into_iter().map(|n| plain(n, self.with(Subject::Lamps { count: n }))).collect(),
+                counts(1, options.lights)
+                    .into_iter()
+                    .map(|n| plain(n, self.with(Subject::Lamps { count: n })))
+                    .collect(),
             ),
             _ => return None,
         })
@@ -236,18 +242,7 @@ impl Planner<'_> {
         use Quantity as Q;
         let (options, picture) = (self.options, self.picture());
         match self.name {
-            "resolution" => {
-                let sizes = [1, 2, 4, 8, 16].map(|factor| options.size.map(|side| (side * factor).div_ceil(4).min(MAX_SIDE)));
-                self.sweep(
-                    "The room, 1 spp".to_owned(),
-                    &[Q::Render, Q::Sample, Q::Rate, Q::FilmPerPixel, Q::RenderPerPixel, Q::Peak],
-                    &[Q::Render, Q::Sample, Q::Peak],
-                    sizes
-                        .into_iter()
-                        .map(|size| plain(size[0] as usize * size[1] as usize, Case { size, spp: 1, ..self.base.clone() }))
-                        .collect(),
-                )
-            }
+            "resolution" => self.sweep_of_resolutions(),
             "spp" => {
                 let counts = [1, 4, 16, 64, 256].map(|spp| if options.quick { spp.min(64) } else { spp });
                 let mut counts = counts.to_vec();
@@ -257,14 +252,20 @@ impl Planner<'_> {
                     format!("The room, {}x{}", size[0], size[1]),
                     &[Q::Render, Q::Sample, Q::Rate, Q::Peak],
                     &[Q::Render, Q::Sample],
-                    counts.into_iter().map(|spp| plain(spp as usize, Case { size, spp, ..self.base.clone() })).collect(),
+                    counts
+                        .into_iter()
+                        .map(|spp| plain(spp as usize, Case { size, spp, ..self.base.clone() }))
+                        .collect(),
                 )
             }
             "depth" => self.sweep(
                 format!("The room, {picture}; no path ends by chance"),
                 &[Q::Render, Q::Sample, Q::Rate, Q::RaysPerSample],
                 &[Q::Sample, Q::RaysPerSample],
-                [1, 2, 4, 8, 16, 32].into_iter().map(|depth| plain(depth as usize, Case { depth, ..self.base.clone() })).collect(),
+                [1, 2, 4, 8, 16, 32]
+                    .into_iter()
+                    .map(|depth| plain(depth as usize, Case { depth, ..self.base.clone() }))
+                    .collect(),
             ),
             "layers" => {
                 let sets = layer_sets();
@@ -273,37 +274,57 @@ impl Planner<'_> {
                     &[Q::Sample, Q::FilmPerPixel, Q::RenderPerPixel, Q::Peak],
                     &[Q::Sample, Q::FilmPerPixel],
                     sets.into_iter()
-                        .map(|(name, channels, layers)| (f64::from(channels), Some(name.to_owned()), Case { layers, ..self.base.clone() }))
+                        .map(|(name, channels, layers)| {
+                            (f64::from(channels), Some(name.to_owned()), Case { layers, ..self.base.clone() })
+                        })
                         .collect(),
                 )
             }
-            _ => {
-                let triangles = if options.quick { 10_000 } else { 1_000_000 }.min(options.triangles);
-                let spp = 4 * options.spp;
-                self.sweep(
-                    format!("A bumpy sphere of {triangles} triangles, {}x{}, {spp} spp", options.size[0], options.size[1]),
-                    &[Q::Build, Q::Render, Q::Sample, Q::Rate],
-                    &[Q::Build, Q::Render, Q::Sample],
-                    doubled(options.threads)
-                        .into_iter()
-                        .map(|threads| plain(threads, Case { threads, spp, ..self.with(Subject::Sphere { triangles }) }))
-                        .collect(),
-                )
-            }
+            _ => self.sweep_of_threads(),
         }
+    }
+
+    fn sweep_of_resolutions(&self) -> Sweep {
+        use Quantity as Q;
+        let sizes =
+            [1, 2, 4, 8, 16].map(|factor| self.options.size.map(|side| (side * factor).div_ceil(4).min(MAX_SIDE)));
+        let case =
+            |size: [u32; 2]| plain(size[0] as usize * size[1] as usize, Case { size, spp: 1, ..self.base.clone() });
+        self.sweep(
+            "The room, 1 spp".to_owned(),
+            &[Q::Render, Q::Sample, Q::Rate, Q::FilmPerPixel, Q::RenderPerPixel, Q::Peak],
+            &[Q::Render, Q::Sample, Q::Peak],
+            sizes.into_iter().map(case).collect(),
+        )
+    }
+
+    fn sweep_of_threads(&self) -> Sweep {
+        use Quantity as Q;
+        let options = self.options;
+        let triangles = if options.quick { 10_000 } else { 1_000_000 }.min(options.triangles);
+        let spp = 4 * options.spp;
+        let case = |threads| plain(threads, Case { threads, spp, ..self.with(Subject::Sphere { triangles }) });
+        self.sweep(
+            format!("A bumpy sphere of {triangles} triangles, {}x{}, {spp} spp", options.size[0], options.size[1]),
+            &[Q::Build, Q::Render, Q::Sample, Q::Rate],
+            &[Q::Build, Q::Render, Q::Sample],
+            doubled(options.threads).into_iter().map(case).collect(),
+        )
     }
 }
 
 /// From `first` by factors of ten up to `last`, and `last` itself.
 fn counts(first: usize, last: usize) -> Vec<usize> {
-    let mut counts: Vec<usize> = std::iter::successors(Some(first), |n| n.checked_mul(10)).take_while(|n| *n < last).collect();
+    let mut counts: Vec<usize> =
+        std::iter::successors(Some(first), |n| n.checked_mul(10)).take_while(|n| *n < last).collect();
     counts.push(last);
     counts
 }
 
 /// 1, 2, 4 and so on up to `last`, and `last` itself.
 fn doubled(last: usize) -> Vec<usize> {
-    let mut counts: Vec<usize> = std::iter::successors(Some(1), |n: &usize| n.checked_mul(2)).take_while(|n| *n < last).collect();
+    let mut counts: Vec<usize> =
+        std::iter::successors(Some(1), |n: &usize| n.checked_mul(2)).take_while(|n| *n < last).collect();
     counts.push(last);
     counts
 }
@@ -315,6 +336,9 @@ mod tests {
     #[test]
     fn counts_end_with_the_last() {
         assert_eq!(counts(1_000, 20_000_000), [1_000, 10_000, 100_000, 1_000_000, 10_000_000, 20_000_000]);
-        assert_eq!((counts(1, 1), counts(1, 100), doubled(1), doubled(6)), (vec![1], vec![1, 10, 100], vec![1], vec![1, 2, 4, 6]));
+        assert_eq!(
+            (counts(1, 1), counts(1, 100), doubled(1), doubled(6)),
+            (vec![1], vec![1, 10, 100], vec![1], vec![1, 2, 4, 6])
+        );
     }
 }

@@ -17,9 +17,10 @@ use crate::bench::{Fit, Machine, fit, median_and_range};
 use crate::error::{Error, Result};
 
 /// The columns of the CSV file.
-const COLUMNS: &str = "sweep,at,repeat,width,height,spp,depth,threads,accelerator,triangles,instances,lights,load_seconds,build_seconds,\
-                       first_pass_seconds,render_seconds,processor_seconds,samples,rays,mesh_bytes,accelerator_bytes,film_bytes_per_pixel,\
-                       start_bytes,made_bytes,load_peak_bytes,build_peak_bytes,before_render_bytes,render_peak_bytes";
+const COLUMNS: &str = "sweep,at,repeat,width,height,spp,depth,threads,accelerator,triangles,instances,lights,\
+                       load_seconds,build_seconds,first_pass_seconds,render_seconds,processor_seconds,samples,rays,\
+                       mesh_bytes,accelerator_bytes,film_bytes_per_pixel,start_bytes,made_bytes,load_peak_bytes,\
+                       build_peak_bytes,before_render_bytes,render_peak_bytes";
 
 /// What the sweep over threads is judged by.
 const SPEEDUP: &str = "times one thread";
@@ -133,7 +134,8 @@ impl ScaleReport {
     pub(super) fn summarize(&mut self, sweeps: &[Sweep]) {
         for (report, sweep) in self.sweeps.iter_mut().zip(sweeps) {
             for point in &mut report.points {
-                point.values = sweep.columns.iter().chain(sweep.fitted).filter_map(|quantity| point.value(*quantity)).collect();
+                point.values =
+                    sweep.columns.iter().chain(sweep.fitted).filter_map(|quantity| point.value(*quantity)).collect();
                 let mut seen = Vec::new();
                 point.values.retain(|value| {
                     !seen.contains(&value.name) && {
@@ -158,7 +160,9 @@ impl ScaleReport {
     /// The cases that failed, with the reason.
     pub fn failures(&self) -> Vec<String> {
         let points = self.sweeps.iter().flat_map(|sweep| sweep.points.iter().map(move |point| (sweep, point)));
-        points.filter_map(|(sweep, point)| Some(format!("{} {}: {}", sweep.name, point.name(), point.failure.as_ref()?))).collect()
+        points
+            .filter_map(|(sweep, point)| Some(format!("{} {}: {}", sweep.name, point.name(), point.failure.as_ref()?)))
+            .collect()
     }
 
     /// The sweeps of which anything was measured.
@@ -181,11 +185,24 @@ impl ScaleReport {
             for point in &sweep.points {
                 for (repeat, run) in point.runs.iter().enumerate() {
                     let Case { size: [width, height], spp, depth, threads, accel, .. } = &point.case;
-                    let lead = [sweep.name.to_owned(), point.at.to_string(), repeat.to_string(), width.to_string(), height.to_string()];
+                    let lead = [
+                        sweep.name.to_owned(),
+                        point.at.to_string(),
+                        repeat.to_string(),
+                        width.to_string(),
+                        height.to_string(),
+                    ];
                     let how = [spp.to_string(), depth.to_string(), threads.to_string(), field(accel)];
                     let counts = [run.triangles, run.instances, run.lights].map(|n| n.to_string());
-                    let seconds = [run.load_seconds, run.build_seconds, run.first_pass_seconds, run.render_seconds, run.processor_seconds];
-                    let sizes = [run.samples, run.rays, run.mesh_bytes, run.accelerator_bytes, run.film_bytes_per_pixel];
+                    let seconds = [
+                        run.load_seconds,
+                        run.build_seconds,
+                        run.first_pass_seconds,
+                        run.render_seconds,
+                        run.processor_seconds,
+                    ];
+                    let sizes =
+                        [run.samples, run.rays, run.mesh_bytes, run.accelerator_bytes, run.film_bytes_per_pixel];
                     let memory = run.memory.map(|m| [m.start, m.made, m.load, m.build, m.before_render, m.render]);
                     let memory = memory.map_or([""; 6].map(str::to_owned), |bytes| bytes.map(|n| n.to_string()));
                     let cells = lead.into_iter().chain(how).chain(counts).chain(seconds.map(|s| s.to_string()));
@@ -254,20 +271,29 @@ impl ScaleReport {
 
     fn header(&self) -> String {
         let cut = if self.interrupted { " Interrupted: what is missing was not measured." } else { "" };
-        format!("{}; `{}`. Medians of {} repeats in turn (lowest to highest).{cut}", self.machine.line(), self.command, self.repeats)
+        format!(
+            "{}; `{}`. Medians of {} repeats in turn (lowest to highest).{cut}",
+            self.machine.line(),
+            self.command,
+            self.repeats
+        )
     }
 
     /// What the columns mean.
     fn notes(&self) -> Vec<String> {
         let fixed = [
-            "Every case runs in a process of its own; scenes are made in memory first, which no time includes. Peak: the most memory that the \
-             process held from then on, the made meshes and the program itself included.",
-            "Load: from the description to placed and checked meshes and lights. First picture: load, build and the first sample of every pixel. \
-             Processor ns: of all threads together.",
-            "Slopes: exponents of power laws, by least squares of the logarithms of the medians, with their standard errors. 0 costs nothing \
-             more, 1 is in proportion.",
+            "Every case runs in a process of its own; scenes are made in memory first, which no time includes. Peak: \
+             the most memory that the process held from then on, the made meshes and the program itself included.",
+            "Load: from the description to placed and checked meshes and lights. First picture: load, build and the \
+             first sample of every pixel. Processor ns: of all threads together.",
+            "Slopes: exponents of power laws, by least squares of the logarithms of the medians, with their standard \
+             errors. 0 costs nothing more, 1 is in proportion.",
         ];
-        fixed.iter().map(|note| (*note).to_owned()).chain(self.failures().iter().map(|failure| format!("Failed: {failure}"))).collect()
+        fixed
+            .iter()
+            .map(|note| (*note).to_owned())
+            .chain(self.failures().iter().map(|failure| format!("Failed: {failure}")))
+            .collect()
     }
 
     /// How costs grow.
@@ -276,8 +302,16 @@ impl ScaleReport {
         for sweep in &self.sweeps {
             for law in &sweep.slopes {
                 let curve = sweep.curve(law.name);
-                let end = |point: Option<&(f64, f64)>| point.map_or_else(String::new, |(x, y)| format!("{} at {}", number(*y), count(*x)));
-                rows.push(vec![sweep.name.to_owned(), law.name.to_owned(), law.text(), end(curve.first()), end(curve.last())]);
+                let end = |point: Option<&(f64, f64)>| {
+                    point.map_or_else(String::new, |(x, y)| format!("{} at {}", number(*y), count(*x)))
+                };
+                rows.push(vec![
+                    sweep.name.to_owned(),
+                    law.name.to_owned(),
+                    law.text(),
+                    end(curve.first()),
+                    end(curve.last()),
+                ]);
             }
         }
         let heads = ["over", "cost", "slope", "first", "last"].map(str::to_owned).to_vec();
@@ -288,7 +322,10 @@ impl ScaleReport {
 impl SweepReport {
     /// Medians over the axis.
     fn curve(&self, name: &str) -> Vec<(f64, f64)> {
-        self.points.iter().filter_map(|point| Some((point.at, point.values.iter().find(|value| value.name == name)?.value[0]))).collect()
+        self.points
+            .iter()
+            .filter_map(|point| Some((point.at, point.values.iter().find(|value| value.name == name)?.value[0])))
+            .collect()
     }
 
     /// What is fitted, each against its first point, for costs have different units.
@@ -323,11 +360,17 @@ impl SweepReport {
             .find_map(|point| (!point.values.is_empty()).then(|| point.values.iter().map(|v| v.name).collect()))
             .unwrap_or_default();
         let row = |point: &PointReport| {
-            let cell = |name: &&str| point.values.iter().find(|value| value.name == *name).map_or_else(|| "-".into(), ValueReport::text);
+            let cell = |name: &&str| {
+                point.values.iter().find(|value| value.name == *name).map_or_else(|| "-".into(), ValueReport::text)
+            };
             std::iter::once(point.name()).chain(names.iter().map(cell)).collect()
         };
         let heads = std::iter::once(self.axis).chain(names.iter().copied()).map(str::to_owned).collect();
-        Table { title: self.what.clone(), heads, rows: self.points.iter().filter(|point| !point.runs.is_empty()).map(row).collect() }
+        Table {
+            title: self.what.clone(),
+            heads,
+            rows: self.points.iter().filter(|point| !point.runs.is_empty()).map(row).collect(),
+        }
     }
 }
 

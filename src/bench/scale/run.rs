@@ -98,7 +98,8 @@ pub fn run_case(case: &Case) -> Result<Measured> {
     let made = memory();
 
     let clock = Instant::now();
-    let overrides = Overrides { threads: Some(case.threads), default_outputs: vec!["unused.exr".into()], ..Overrides::default() };
+    let overrides =
+        Overrides { threads: Some(case.threads), default_outputs: vec!["unused.exr".into()], ..Overrides::default() };
     let mut settings = Settings::new(&imported.desc, &overrides)?;
     settings.layers = case.layers.iter().collect();
     settings.accel = case.accel.parse().map_err(|e: accel::UnknownAccel| Error::Usage(e.to_string()))?;
@@ -119,7 +120,14 @@ pub fn run_case(case: &Case) -> Result<Measured> {
     let memory = (|| {
         let (built, rendered) = (built?, rendered?);
         let [start, _] = start?;
-        Some(Memory { start, made: made?[0], load: loaded?[1], build: built[1], before_render: built[0], render: rendered[1] })
+        Some(Memory {
+            start,
+            made: made?[0],
+            load: loaded?[1],
+            build: built[1],
+            before_render: built[0],
+            render: rendered[1],
+        })
     })();
     let summary = compile::Summary::new(&scene);
     Ok(Measured {

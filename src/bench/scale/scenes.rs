@@ -33,12 +33,19 @@ pub(super) fn make(case: &Case) -> Result<Imported> {
     let mut desc: SceneDesc = serde_json::from_value(scene).map_err(|e| Error::Internal(e.to_string()))?;
     if let Subject::Instances { count, .. } = case.subject {
         let object: Value = json!({ "shapes": [mesh_shape(1.0)] });
-        desc.objects.insert("sphere".into(), serde_json::from_value(object).map_err(|e| Error::Internal(e.to_string()))?);
+        desc.objects
+            .insert("sphere".into(), serde_json::from_value(object).map_err(|e| Error::Internal(e.to_string()))?);
         desc.instances = instances(count);
     }
     let mut assets = Assets::default();
     assets.meshes.extend(mesh.map(|mesh| (MESH.to_owned(), mesh)));
-    Ok(Imported { desc, assets: assets.into(), report: Default::default(), files: Default::default(), places: Default::default() })
+    Ok(Imported {
+        desc,
+        assets: assets.into(),
+        report: Default::default(),
+        files: Default::default(),
+        places: Default::default(),
+    })
 }
 
 fn mesh_shape(scale: f64) -> Value {
@@ -48,9 +55,14 @@ fn mesh_shape(scale: f64) -> Value {
 /// Shapes on a floor under a sky, with a lamp.
 fn on_a_floor(mut shapes: Value) -> Value {
     if let Some(shapes) = shapes.as_array_mut() {
-        shapes.push(json!({ "type": "quad", "material": "grey", "origin": [-20, -20, -1.2], "edge_u": [40, 0, 0], "edge_v": [0, 40, 0] }));
-        shapes.push(json!({ "type": "quad", "material": "grey", "origin": [-1, -2, 4], "edge_u": [0, 1, 0], "edge_v": [1, 0, 0],
-                            "emission": { "radiance": [20, 18, 15] } }));
+        shapes.push(json!({
+            "type": "quad", "material": "grey", "origin": [-20, -20, -1.2], "edge_u": [40, 0, 0],
+            "edge_v": [0, 40, 0]
+        }));
+        shapes.push(
+            json!({ "type": "quad", "material": "grey", "origin": [-1, -2, 4], "edge_u": [0, 1, 0], "edge_v": [1, 0, 0],
+                            "emission": { "radiance": [20, 18, 15] } }),
+        );
     }
     json!({
         "camera": { "position": [0, -3.4, 1.2], "look_at": [0, 0, -0.1], "up": [0, 0, 1], "vertical_fov_degrees": 40 },
@@ -62,10 +74,18 @@ fn on_a_floor(mut shapes: Value) -> Value {
 
 /// A closed room with a lamp and two boxes, brightly painted: no path ends before its depth.
 fn room() -> Value {
-    let wall = |material: &str, origin: [f64; 3], edge_u: [f64; 3], edge_v: [f64; 3]| json!({ "type": "quad", "material": material, "origin": origin, "edge_u": edge_u, "edge_v": edge_v });
+    let wall = |material: &str, origin: [f64; 3], edge_u: [f64; 3], edge_v: [f64; 3]| {
+        json!({
+            "type": "quad", "material": material, "origin": origin, "edge_u": edge_u, "edge_v": edge_v
+        })
+    };
     let block = |at: [f64; 3], degrees: f64, size: [f64; 3]| {
-        json!({ "type": "cube", "material": "white",
-                "transform": [{ "scale": size }, { "rotate": { "axis": [0, 1, 0], "degrees": degrees } }, { "translate": at }] })
+        json!({
+            "type": "cube", "material": "white",
+            "transform": [
+                { "scale": size }, { "rotate": { "axis": [0, 1, 0], "degrees": degrees } }, { "translate": at }
+            ]
+        })
     };
     json!({
         "camera": { "position": [0, 1, 0.98], "look_at": [0, 1, -1], "vertical_fov_degrees": 80 },
@@ -83,8 +103,10 @@ fn room() -> Value {
             wall("green", [1.0, 0.0, -1.0], [0.0, 0.0, 2.0], [0.0, 2.0, 0.0]),
             block([-0.35, 0.6, -0.3], 20.0, [0.28, 0.6, 0.28]),
             block([0.35, 0.28, 0.2], -18.0, [0.28, 0.28, 0.28]),
-            { "type": "quad", "material": "white", "origin": [-0.25, 1.98, -0.25], "edge_u": [0.5, 0, 0], "edge_v": [0, 0, 0.5],
-              "emission": { "radiance": [15, 13, 10] } }
+            {
+                "type": "quad", "material": "white", "origin": [-0.25, 1.98, -0.25], "edge_u": [0.5, 0, 0],
+                "edge_v": [0, 0, 0.5], "emission": { "radiance": [15, 13, 10] }
+            }
         ]
     })
 }
@@ -98,7 +120,10 @@ fn below_lamps(count: usize) -> Value {
         "shapes": [
             { "type": "quad", "material": "grey", "origin": [-4, -4, 0], "edge_u": [8, 0, 0], "edge_v": [0, 8, 0] },
             { "type": "sphere", "material": "grey", "radius": 0.8, "transform": [{ "translate": [0, 0, 0.8] }] },
-            { "type": "mesh", "file": MESH, "material": "grey", "emission": { "radiance": [radiance, radiance, radiance] } }
+            {
+                "type": "mesh", "file": MESH, "material": "grey",
+                "emission": { "radiance": [radiance, radiance, radiance] }
+            }
         ]
     })
 }
@@ -134,7 +159,10 @@ fn instances(count: usize) -> Vec<InstanceDesc> {
     let mut place = |i: usize| {
         let corner = [i % cells, i / cells % cells, i / cells / cells].map(|n| -1.1 + cell * (n as f64 + 0.5));
         let steps = vec![
-            TransformStepDesc::Rotate { axis: [rng.range(-1.0, 1.0), rng.range(-1.0, 1.0), 1.5], degrees: rng.range(0.0, 360.0) },
+            TransformStepDesc::Rotate {
+                axis: [rng.range(-1.0, 1.0), rng.range(-1.0, 1.0), 1.5],
+                degrees: rng.range(0.0, 360.0),
+            },
             TransformStepDesc::Scale(ScaleDesc::Uniform(cell * rng.range(0.3, 0.5))),
             TransformStepDesc::Translate(corner),
         ];
@@ -164,7 +192,10 @@ mod tests {
                 .sum();
             let scene = below_lamps(count);
             let radiance = scene["shapes"][2]["emission"]["radiance"][0].as_f64().unwrap();
-            assert!((f64::from(area) * radiance / (10.0 * 16.0 * 0.08) - 1.0).abs() < 1e-4, "{count}: {area} {radiance}");
+            assert!(
+                (f64::from(area) * radiance / (10.0 * 16.0 * 0.08) - 1.0).abs() < 1e-4,
+                "{count}: {area} {radiance}"
+            );
         }
     }
 }

@@ -16,17 +16,20 @@ use crate::sampling::statistics::chi_squared_p_value;
 
 checks! {
     "K1" k1_thin_lens "rays of a film point meet in focus":
-        "random cameras in scenes a thousandth to a thousand in size, disks and blades; errors in units of rounding of origin and direction, 2^-24 of their lengths \
-         (Mitsuba, test_thinlens)";
+        "random cameras in scenes a thousandth to a thousand in size, disks and blades; errors in units of rounding of \
+         origin and direction, 2^-24 of their lengths (Mitsuba, test_thinlens)";
     "K2" k2_blur "blur of what is out of focus":
-        "points of rays in a plane beside the focus, uniform in a disk by a χ² test in 16 rings and 16 sectors; a picture of a small light";
+        "points of rays in a plane beside the focus, uniform in a disk by a χ² test in 16 rings and 16 sectors; a \
+         picture of a small light";
     "K3" k3_pixel_cones "cones have the width of their pixels":
-        "against finite differences of rays one pixel apart: perspective, orthographic, environment, with shift, aspect and near limit \
-         (Mitsuba, test03_sample_ray_diff)";
+        "against finite differences of rays one pixel apart: perspective, orthographic, environment, with shift, \
+         aspect and near limit (Mitsuba, test03_sample_ray_diff)";
     "K4" k4_shutter "what moves leaves a ramp":
-        "a bright card that passes an orthographic camera, and a camera that passes the card: coverage of 64 columns by a χ² test; whole and partial shutters";
+        "a bright card that passes an orthographic camera, and a camera that passes the card: coverage of 64 columns \
+         by a χ² test; whole and partial shutters";
     "K5" k5_projection "rays lead back to their film points":
-        "random cameras at rest and moving, six kinds of projection and framing, points on rays, of parallel ones no farther than the picture is high, projected in f64 (Cycles, kernel_camera_projection_test)";
+        "random cameras at rest and moving, six kinds of projection and framing, points on rays, of parallel ones no \
+         farther than the picture is high, projected in f64 (Cycles, kernel_camera_projection_test)";
 }
 
 const SIZE: [u32; 2] = [200, 100];
@@ -58,7 +61,11 @@ fn k1_thin_lens(effort: Effort) -> Outcome {
         let scale = rng.magnitude(-3.0, 3.0);
         let pose = pose(&mut rng, 3.0 * scale);
         let blades = (i % 3 == 0).then(|| Blades { count: 3 + i / 3 % 7, rotation: rng.range(0.0, TAU) });
-        let lens = Lens { radius: scale * rng.magnitude(-4.0, -0.5), focus_distance: scale * rng.magnitude(-0.3, 1.0), blades };
+        let lens = Lens {
+            radius: scale * rng.magnitude(-4.0, -0.5),
+            focus_distance: scale * rng.magnitude(-0.3, 1.0),
+            blades,
+        };
         let half_height = rng.magnitude(-1.5, 0.3);
         let (sharp, blurred) = (
             placed(pose, Projection::Perspective { half_height, lens: None }),
@@ -75,8 +82,10 @@ fn k1_thin_lens(effort: Effort) -> Outcome {
             let ray = blurred.ray(film, SIZE, rng.pair(), 0.0);
             meet = meet.max((at_depth(&pose, &ray, lens.focus_distance) - focus).length() / unit);
             let on_lens = pose.inverse().transform_point3(ray.origin.as_dvec3());
-            outside +=
-                usize::from(on_lens.length() > lens.radius * (1.0 + 4.0 * UNIT_ROUNDOFF) + 2.0 * UNIT_ROUNDOFF * pose.translation.length());
+            outside += usize::from(
+                on_lens.length()
+                    > lens.radius * (1.0 + 4.0 * UNIT_ROUNDOFF) + 2.0 * UNIT_ROUNDOFF * pose.translation.length(),
+            );
         }
         if blades.is_none() {
             let middle = blurred.ray(film, SIZE, [0.5; 2], 0.0);
@@ -110,7 +119,8 @@ fn small_light(radius: f64, distance: f64, focus: f64, spp: u32) -> Value {
         "film": { "width": 65, "height": 65, "filter": { "type": "box" } },
         "sampler": { "spp": spp },
         "camera": {
-            "position": [0, 0, distance], "look_at": [0, 0, 0], "vertical_fov_degrees": 40, "lens": { "radius": 0.25, "focus_distance": focus }
+            "position": [0, 0, distance], "look_at": [0, 0, 0], "vertical_fov_degrees": 40,
+            "lens": { "radius": 0.25, "focus_distance": focus }
         },
         "shapes": [{ "type": "disk", "radius": radius, "emission": { "radiance": [1, 1, 1] } }],
         "integrator": { "type": "path", "max_depth": 1 }
@@ -154,7 +164,11 @@ fn k2_blur(effort: Effort) -> Outcome {
         error = error.max((radius - 0.25 * (focus - distance).abs() / distance / pixel).abs());
     }
     Outcome::new()
-        .at_least(format!("smallest p-value of {} χ² tests of uniformity", planes.len()), least, sidak_level(planes.len()))
+        .at_least(
+            format!("smallest p-value of {} χ² tests of uniformity", planes.len()),
+            least,
+            sidak_level(planes.len()),
+        )
         .at_most("how far points lie beyond the disk, over its radius", beyond, 1e-5)
         .at_most("error of the blur's radius in a picture, in pixels", error, 0.25)
 }
@@ -167,7 +181,8 @@ fn k3_pixel_cones(effort: Effort) -> Outcome {
     for _ in 0..effort.pick(300, 30_000) {
         let pose = pose(&mut rng, 1.0);
         let eye = pose.translation;
-        let framing = Framing { pixel_aspect: rng.range(0.5, 2.0), shift: [rng.range(-0.3, 0.3), rng.range(-0.3, 0.3)] };
+        let framing =
+            Framing { pixel_aspect: rng.range(0.5, 2.0), shift: [rng.range(-0.3, 0.3), rng.range(-0.3, 0.3)] };
         let lens = Lens { radius: 1e-9, focus_distance: 5.0, blades: None };
         let projections = [
             Projection::Perspective { half_height: rng.range(0.1, 1.0), lens: Some(lens) },
@@ -180,7 +195,10 @@ fn k3_pixel_cones(effort: Effort) -> Outcome {
             let at = |x: f64, y: f64| {
                 let ray = camera.ray(DVec2::new(film.x + x, film.y + y).as_vec2(), FINE, [0.5; 2], 0.0);
                 // All at the same distance from the camera.
-                (ray, ray.origin.as_dvec3() + ray.direction.as_dvec3() * (40.0 - (ray.origin.as_dvec3() - eye).length()))
+                (
+                    ray,
+                    ray.origin.as_dvec3() + ray.direction.as_dvec3() * (40.0 - (ray.origin.as_dvec3() - eye).length()),
+                )
             };
             // Over 8 pixels, so that the rounding of rays does not count either.
             let (right, down) = ((at(4.0, 0.0).1 - at(-4.0, 0.0).1) / 8.0, (at(0.0, 4.0).1 - at(0.0, -4.0).1) / 8.0);
@@ -211,10 +229,14 @@ fn passing_card(shutter: [f64; 2], camera_moves: bool, spp: u32) -> Value {
         "film": { "width": COLUMNS, "height": ROWS, "filter": { "type": "box" } },
         "sampler": { "type": "independent", "spp": spp },
         "integrator": { "type": "path", "max_depth": 1 },
-        "camera": { "type": "orthographic", "position": [0, 0, 5], "look_at": [0, 0, 0], "view_height": 0.5, "shutter": shutter },
+        "camera": {
+            "type": "orthographic", "position": [0, 0, 5], "look_at": [0, 0, 0], "view_height": 0.5, "shutter": shutter
+        },
         "materials": { "black": { "type": "diffuse", "albedo": 0 } },
         "lights": [{ "type": "environment", "radiance": [1, 1, 1] }],
-        "shapes": [{ "type": "quad", "material": "black", "origin": [-0.5, -1, 0], "edge_u": [1, 0, 0], "edge_v": [0, 2, 0] }]
+        "shapes": [{
+            "type": "quad", "material": "black", "origin": [-0.5, -1, 0], "edge_u": [1, 0, 0], "edge_v": [0, 2, 0]
+        }]
     });
     if camera_moves {
         scene["camera"]["motion"] = way(1.0, -1.0);
@@ -269,7 +291,8 @@ fn k4_shutter(effort: Effort) -> Outcome {
             evidence.1.extend(expected);
         }
     }
-    let times = (0..=1000).map(|i| placed(DAffine3::IDENTITY, Projection::Environment).time((i as f32 / 1000.0).min(1.0f32.next_down())));
+    let times = (0..=1000)
+        .map(|i| placed(DAffine3::IDENTITY, Projection::Environment).time((i as f32 / 1000.0).min(1.0f32.next_down())));
     Outcome::new()
         .at_least(format!("smallest p-value of {tests} χ² tests over columns"), least, sidak_level(tests))
         .none("columns that are never or always covered, and hardly so", impossible)
@@ -282,7 +305,10 @@ fn project(projection: &Projection, framing: &Framing, p: DVec3) -> DVec2 {
     let [width, height] = SIZE.map(f64::from);
     let planar = |x: f64, y: f64, half_height: f64| {
         let pixels = height / (2.0 * half_height);
-        DVec2::new((0.5 - framing.shift[0]) * width + x * pixels / framing.pixel_aspect, (0.5 + framing.shift[1]) * height - y * pixels)
+        DVec2::new(
+            (0.5 - framing.shift[0]) * width + x * pixels / framing.pixel_aspect,
+            (0.5 + framing.shift[1]) * height - y * pixels,
+        )
     };
     match projection {
         Projection::Perspective { half_height, .. } => planar(p.x / -p.z, p.y / -p.z, *half_height),
@@ -295,15 +321,24 @@ fn project(projection: &Projection, framing: &Framing, p: DVec3) -> DVec2 {
     }
 }
 
+/// What [`k5_projection`] goes through.
+const PROJECTIONS: [&str; 6] = [
+    "perspective",
+    "perspective with framing",
+    "orthographic",
+    "orthographic with framing",
+    "environment",
+    "moving perspective",
+];
+
 fn k5_projection(effort: Effort) -> Outcome {
     let mut rng = Rng::new(5);
-    let names =
-        ["perspective", "perspective with framing", "orthographic", "orthographic with framing", "environment", "moving perspective"];
-    let mut worst = [0f64; 6];
+    let mut worst = [0f64; PROJECTIONS.len()];
     let mut corner = 0f64;
     for _ in 0..effort.pick(2_000, 300_000) {
         let half_height = rng.magnitude(-1.0, 0.3);
-        let framing = Framing { pixel_aspect: rng.range(0.5, 2.0), shift: [rng.range(-0.5, 0.5), rng.range(-0.5, 0.5)] };
+        let framing =
+            Framing { pixel_aspect: rng.range(0.5, 2.0), shift: [rng.range(-0.5, 0.5), rng.range(-0.5, 0.5)] };
         let (plain, perspective) = (Framing::default(), Projection::Perspective { half_height, lens: None });
         let orthographic = Projection::Orthographic { half_height: 3.0 * half_height };
         let kinds = [
@@ -320,7 +355,8 @@ fn k5_projection(effort: Effort) -> Outcome {
             let mut camera = placed(start, projection).with_framing(framing).with_near(near);
             let (mut there, mut time) = (start, 0.0);
             if kind == 5 {
-                let motion = Motion::keyframed(&[(0.0, start), (1.0, pose(&mut rng, 0.5))]).expect("rotations are regular");
+                let motion =
+                    Motion::keyframed(&[(0.0, start), (1.0, pose(&mut rng, 0.5))]).expect("rotations are regular");
                 time = rng.unit_f32();
                 there = motion.map_at(f64::from(time));
                 camera = camera.with_motion(motion).expect("rotations are regular");
@@ -345,8 +381,7 @@ fn k5_projection(effort: Effort) -> Outcome {
         corner = corner.max(((upright - exact) / exact).abs().max_element() / (2.0 * UNIT_ROUNDOFF));
     }
     let outcome = Outcome::new().at_most("error of the picture's corners, in ulp", corner, 2.0);
-    names
-        .iter()
-        .zip(worst)
-        .fold(outcome, |outcome, (name, worst)| outcome.at_most(format!("error over the picture's height, {name}"), worst, 1e-6))
+    PROJECTIONS.iter().zip(worst).fold(outcome, |outcome, (name, worst)| {
+        outcome.at_most(format!("error over the picture's height, {name}"), worst, 1e-6)
+    })
 }

@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use crate::accel::Accelerator;
 use crate::geometry::{
-    Analytic, Disk, Frustum, Geometry, Hit, Instance, Mesh, Object, Profile, Quad, Revolution, Shape, Sphere, SurfaceInteraction,
-    TransformedShape,
+    Analytic, Disk, Frustum, Geometry, Hit, Instance, Mesh, Object, Profile, Quad, Revolution, Shape, Sphere,
+    SurfaceInteraction, TransformedShape,
 };
 use crate::id::{ObjectId, ShapeId};
 pub use crate::math::Rng;
@@ -83,7 +83,8 @@ pub fn grid(origin: DVec3, x: DVec3, y: DVec3, n: u32, height: impl Fn(f64, f64)
     }
     let at = |i: u32, j: u32| j * (n + 1) + i;
     let cells = (0..n).flat_map(|j| (0..n).map(move |i| (i, j)));
-    let triangles = cells.flat_map(|(i, j)| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]);
+    let triangles = cells
+        .flat_map(|(i, j)| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]);
     mesh(&positions, triangles.collect())
 }
 
@@ -129,7 +130,10 @@ pub fn all_analytic_shapes() -> Vec<(&'static str, Analytic)> {
         ("clipped sphere", Analytic::Sphere(Sphere::new(1.0, -0.4, 0.7, 4.0).expect(VALID))),
         (
             "quad",
-            Analytic::Quad(Quad::new(DVec3::new(-1.0, -0.5, 0.1), DVec3::new(2.0, 0.1, 0.0), DVec3::new(0.3, 1.0, 0.2)).expect(VALID)),
+            Analytic::Quad(
+                Quad::new(DVec3::new(-1.0, -0.5, 0.1), DVec3::new(2.0, 0.1, 0.0), DVec3::new(0.3, 1.0, 0.2))
+                    .expect(VALID),
+            ),
         ),
         ("disk", Analytic::Disk(Disk::new(1.0, 0.0, TAU).expect(VALID))),
         ("ring sector", Analytic::Disk(Disk::new(1.0, 0.4, 2.5).expect(VALID))),
@@ -143,7 +147,8 @@ pub fn all_analytic_shapes() -> Vec<(&'static str, Analytic)> {
 
 /// One of each analytic shape, turned and moved, in a cube of half size 4 around `center`.
 pub fn placed_analytic_shapes(rng: &mut Rng, center: DVec3) -> Vec<Shape> {
-    let place = |shape| Shape::Analytic(TransformedShape::new(shape, transform(rng.rotation(), center + 2.0 * rng.cube())));
+    let place =
+        |shape| Shape::Analytic(TransformedShape::new(shape, transform(rng.rotation(), center + 2.0 * rng.cube())));
     all_analytic_shapes().into_iter().map(|(_, shape)| shape).map(place).collect()
 }
 
@@ -189,7 +194,8 @@ pub fn ids(hit: &Hit) -> (u32, u32, u32) {
 pub fn reach(geometry: &Geometry, ray: &Ray, hit: &Hit) -> f64 {
     let Shape::Mesh(mesh) = geometry.shape(hit.shape) else { return 0.0 };
     let points = mesh.triangle_points(hit.prim);
-    let origin = if hit.instance == Hit::NO_INSTANCE { *ray } else { geometry.instance(hit.instance).object_ray(ray) }.origin;
+    let origin =
+        if hit.instance == Hit::NO_INSTANCE { *ray } else { geometry.instance(hit.instance).object_ray(ray) }.origin;
     let far = |p: Vec3| (p - origin).abs().max_element();
     f64::from(far(points.a).max(far(points.b)).max(far(points.c)))
 }

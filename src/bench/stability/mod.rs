@@ -138,11 +138,15 @@ pub fn choose(names: &[String]) -> Result<Vec<&'static Check>> {
     for name in names {
         if !GROUPS.iter().any(|(letter, ..)| name == letter) && !catalogue().any(|check| check.id == name) {
             let groups: Vec<String> = GROUPS.iter().map(|(letter, name, _)| format!("{letter} ({name})")).collect();
-            return Err(Error::Usage(format!("no check is called {name:?}; --list shows them; groups are {}", groups.join(", "))));
+            return Err(Error::Usage(format!(
+                "no check is called {name:?}; --list shows them; groups are {}",
+                groups.join(", ")
+            )));
         }
     }
     let selected = |check: &&Check| {
-        names.is_empty() || names.iter().any(|name| check.id == name || check.id.trim_end_matches(char::is_numeric) == name)
+        names.is_empty()
+            || names.iter().any(|name| check.id == name || check.id.trim_end_matches(char::is_numeric) == name)
     };
     Ok(catalogue().filter(selected).collect())
 }
@@ -221,7 +225,11 @@ pub(crate) mod testing {
         for (letter, _, checks) in GROUPS {
             for check in *checks {
                 assert!(seen.insert(check.id), "{} is there twice", check.id);
-                assert!(check.id.starts_with(letter) && check.id[1..].parse::<u32>().is_ok(), "{} in group {letter}", check.id);
+                assert!(
+                    check.id.starts_with(letter) && check.id[1..].parse::<u32>().is_ok(),
+                    "{} in group {letter}",
+                    check.id
+                );
             }
         }
     }
@@ -242,6 +250,9 @@ pub(crate) mod testing {
             report::write_evidence(folder.path(), &report).unwrap(),
             ["Z1-grid-result.exr", "Z1-grid-reference.exr", "Z1-grid-error.exr"]
         );
-        assert_eq!(crate::output::read_exr(&folder.path().join("Z1-grid-error.exr")).unwrap().rgb(0, 0), Some([-2.0; 3]));
+        assert_eq!(
+            crate::output::read_exr(&folder.path().join("Z1-grid-error.exr")).unwrap().rgb(0, 0),
+            Some([-2.0; 3])
+        );
     }
 }

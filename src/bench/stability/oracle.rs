@@ -67,7 +67,11 @@ impl ExactTransform {
     pub fn new(transform: &Transform) -> Self {
         let m = &transform.world_from_object;
         let columns = [m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis].map(exactly);
-        Self { columns, translation: exactly(m.translation), determinant: dot(columns[0], cross(columns[1], columns[2])) }
+        Self {
+            columns,
+            translation: exactly(m.translation),
+            determinant: dot(columns[0], cross(columns[1], columns[2])),
+        }
     }
 
     /// A vector from world to object, by Cramer's rule.
@@ -136,7 +140,8 @@ impl Case {
         // A sphere is not cut at its poles.
         let widen = |z: f64| if z.abs() == radius { 2.0 * z } else { z };
         let (z_min, z_max) = (widen(z_min), widen(z_max));
-        let surface = Surface::Quadric { round: 1.0, z_squared: 1.0, z_linear: 0.0, constant: -radius * radius, z_min, z_max };
+        let surface =
+            Surface::Quadric { round: 1.0, z_squared: 1.0, z_linear: 0.0, constant: -radius * radius, z_min, z_max };
         Self { name, shape, size: radius, axes: DMat3::IDENTITY, surface, phi_max }
     }
 
@@ -160,7 +165,11 @@ impl Case {
         let point = |i: i32| [bottom + (top - bottom) * f64::from(i) / 3.0, height * f64::from(i) / 3.0];
         let profile = Profile::bezier(&[point(0), point(1), point(2), point(3)]).expect(VALID);
         let shape = Analytic::Revolution(Revolution::new(&profile, TAU).expect(VALID));
-        Self { shape, axes: DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X), ..Self::frustum(name, [bottom, top], height, TAU) }
+        Self {
+            shape,
+            axes: DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X),
+            ..Self::frustum(name, [bottom, top], height, TAU)
+        }
     }
 
     /// A disk, a ring or a sector.

@@ -98,8 +98,12 @@ pub fn floor_probe(at: [f64; 3], lights: Value) -> Value {
         at,
         json!({
             "integrator": { "type": "path", "max_depth": 2 },
-            "materials": { "white": { "type": "diffuse", "albedo": 1.0 }, "black": { "type": "diffuse", "albedo": 0.0 } },
-            "shapes": [{ "type": "quad", "material": "white", "origin": [-9, 0, 9], "edge_u": [18, 0, 0], "edge_v": [0, 0, -18] }]
+            "materials": {
+                "white": { "type": "diffuse", "albedo": 1.0 }, "black": { "type": "diffuse", "albedo": 0.0 }
+            },
+            "shapes": [{
+                "type": "quad", "material": "white", "origin": [-9, 0, 9], "edge_u": [18, 0, 0], "edge_v": [0, 0, -18]
+            }]
         }),
     );
     for light in lights.as_array().into_iter().flatten() {
@@ -132,12 +136,23 @@ mod tests {
             "camera": { "position": [0, 1, 5], "look_at": [0, 0.5, 0], "vertical_fov_degrees": 40 },
             "sampler": { "spp": 1 },
             "integrator": { "type": "path", "max_depth": 3 },
-            "materials": { "white": { "type": "diffuse", "albedo": 0.7 }, "glass": { "type": "dielectric", "ior": 1.5, "roughness": 0.3 } },
+            "materials": {
+                "white": { "type": "diffuse", "albedo": 0.7 },
+                "glass": { "type": "dielectric", "ior": 1.5, "roughness": 0.3 }
+            },
             "shapes": [
-                { "type": "quad", "material": "white", "origin": [-3, 0, 3], "edge_u": [6, 0, 0], "edge_v": [0, 0, -6] },
+                {
+                    "type": "quad", "material": "white", "origin": [-3, 0, 3], "edge_u": [6, 0, 0], "edge_v": [0, 0, -6]
+                },
                 { "type": "sphere", "material": "glass", "radius": 0.6, "transform": [{ "translate": [0, 0.6, 0] }] },
-                { "type": "mesh", "material": "white", "positions": [[-1, 0, -1], [1, 0, -1], [0, 2, -1]], "triangles": [[0, 1, 2]] },
-                { "type": "sphere", "material": "white", "radius": 0.3, "emission": { "radiance": [9, 9, 9] }, "transform": [{ "translate": [1, 3, 1] }] }
+                {
+                    "type": "mesh", "material": "white", "positions": [[-1, 0, -1], [1, 0, -1], [0, 2, -1]],
+                    "triangles": [[0, 1, 2]]
+                },
+                {
+                    "type": "sphere", "material": "white", "radius": 0.3, "emission": { "radiance": [9, 9, 9] },
+                    "transform": [{ "translate": [1, 3, 1] }]
+                }
             ]
         });
         let prepared = prepare(&scene, &Overrides { threads: Some(2), ..Overrides::default() });

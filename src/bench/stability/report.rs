@@ -90,7 +90,10 @@ impl StabilityReport {
     /// # Errors
     /// [`Error::Output`] naming the file.
     pub fn write_to(&self, folder: &Path) -> Result<()> {
-        write_files(folder, &[(JSON, self.json()?), ("stability.md", self.markdown()), ("stability.html", self.html()?)])?;
+        write_files(
+            folder,
+            &[(JSON, self.json()?), ("stability.md", self.markdown()), ("stability.html", self.html()?)],
+        )?;
         for failure in self.failures() {
             write_evidence(&folder.join("evidence"), failure)?;
         }
@@ -107,21 +110,25 @@ impl StabilityReport {
 
     /// A line for each check: id, how it ended, name.
     pub fn lines(&self) -> Vec<String> {
-        let line = |check: &CheckReport| format!("{:<4} {:<7} {:7.1} s  {}", check.id, word(check.status), check.seconds, check.name);
+        let line = |check: &CheckReport| {
+            format!("{:<4} {:<7} {:7.1} s  {}", check.id, word(check.status), check.seconds, check.name)
+        };
         self.checks.iter().map(line).collect()
     }
 
     /// The checks of an earlier run of this version that left `stability.json` in a folder, those that failed excepted;
     /// none if there is no such file.
     pub fn kept(folder: &Path, effort: Effort) -> Vec<CheckReport> {
-        let report = std::fs::read(folder.join(JSON)).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
+        let report =
+            std::fs::read(folder.join(JSON)).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
         let Some(report) = report else { return Vec::new() };
         let is_same = report["machine"]["version"] == env!("CARGO_PKG_VERSION")
             && serde_json::to_value(effort).is_ok_and(|effort| report["effort"] == effort);
         let checks = report["checks"].as_array().filter(|_| is_same).map_or(&[][..], Vec::as_slice);
         let kept = |check: &Value| {
             let known = catalogue().find(|known| check["id"] == known.id)?;
-            let outcome = Outcome::deserialize(&check["outcome"]).ok().filter(|outcome| outcome.status() != Status::Failed)?;
+            let outcome =
+                Outcome::deserialize(&check["outcome"]).ok().filter(|outcome| outcome.status() != Status::Failed)?;
             Some(known.report(outcome, check["seconds"].as_f64()?))
         };
         checks.iter().filter_map(kept).collect()
@@ -133,8 +140,8 @@ impl StabilityReport {
         let seconds: f64 = self.checks.iter().map(|check| check.seconds).sum();
         let cut = if self.interrupted { " Interrupted: what is missing was not run." } else { "" };
         format!(
-            "{} checks: {} passed, {} fell short of what one would wish (causes below), {} failed, in {seconds:.0} s. {} ({}, {} threads), \
-             steradian {}; `{}`. False-alarm rate of each statistical check: 1e-6.{cut}",
+            "{} checks: {} passed, {} fell short of what one would wish (causes below), {} failed, in {seconds:.0} s. \
+             {} ({}, {} threads), steradian {}; `{}`. False-alarm rate of each statistical check: 1e-6.{cut}",
             self.checks.len(),
             count(Status::Passed),
             count(Status::Short),
@@ -240,7 +247,10 @@ fn draw(plot: &Plot) -> Result<String> {
     let curves: Vec<Curve> = plot
         .curves
         .iter()
-        .map(|(name, points)| Curve { name: name.clone(), points: points.iter().map(|&(x, y)| (x, y.max(plot.floor))).collect() })
+        .map(|(name, points)| Curve {
+            name: name.clone(),
+            points: points.iter().map(|&(x, y)| (x, y.max(plot.floor))).collect(),
+        })
         .collect();
     plot::curves(&curves, &plot.x, &plot.y, &[])
 }
@@ -264,7 +274,9 @@ mod tests {
 
     #[test]
     fn numbers_are_short_and_right() {
-        for (value, text) in [(0.0, "0"), (12.0, "12"), (1e-6, "1.000e-6"), (0.998, "0.998"), (1234.56, "1235"), (-0.5, "-0.5")] {
+        for (value, text) in
+            [(0.0, "0"), (12.0, "12"), (1e-6, "1.000e-6"), (0.998, "0.998"), (1234.56, "1235"), (-0.5, "-0.5")]
+        {
             assert_eq!(number(value), text);
         }
     }

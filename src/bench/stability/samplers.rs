@@ -11,24 +11,29 @@ use crate::sampling::{PixelSeed, Sampler, SamplerKind};
 
 checks! {
     "S1" s1_elementary_intervals "every elementary interval holds one sample":
-        "Owen-scrambled Sobol points, blocks of 2^k samples for k from 2 to 10, from the first and from later ones: each dimension, and the first \
-         two of a set together in all shapes of base 2 (pbrt, samplers_test.cpp)";
+        "Owen-scrambled Sobol points, blocks of 2^k samples for k from 2 to 10, from the first and from later ones: \
+         each dimension, and the first two of a set together in all shapes of base 2 (pbrt, samplers_test.cpp)";
     "S2" s2_any_order "samples do not depend on their order":
-        "samples of random pixels and sets forwards, backwards and from a sampler made anew, bit for bit (pbrt, Sampler.ConsistentValues)";
+        "samples of random pixels and sets forwards, backwards and from a sampler made anew, bit for bit (pbrt, \
+         Sampler.ConsistentValues)";
     "S3" s3_range "numbers are in [0, 1)":
         "2^24 samples of four dimensions from both samplers; the extremes are reached to 1e-6 (pbrt, Generators)";
     "S4" s4_uniformity "numbers are uniform":
-        "Sobol: 1024 samples in 16 bins and 16 x 16, counts exact; independent: chi-square over 16 x 16 cells of all pairs of dimensions; the first \
-         samples of 65536 pixels and of as many sets (Mitsuba, samplers/tests/utils.py)";
+        "Sobol: 1024 samples in 16 bins and 16 x 16, counts exact; independent: chi-square over 16 x 16 cells of all \
+         pairs of dimensions; the first samples of 65536 pixels and of as many sets (Mitsuba, samplers/tests/utils.py)";
     "S5" s5_scrambles "scrambles of pixels and sets are independent":
-        "in place of pbrt's ZSobolSampler.ValidIndices, for pixels share no sequence current: each pixel and set scrambles its own by a hash; seeds of \
-         a picture's pixels are equal no more often than random ones, and first samples of neighbours fill 16 x 16 cells evenly (chi-square)";
+        "in place of pbrt's ZSobolSampler.ValidIndices, for pixels share no sequence current: each pixel and set \
+         scrambles its own by a hash; seeds of a picture's pixels are equal no more often than random ones, and first \
+         samples of neighbours fill 16 x 16 cells evenly (chi-square)";
     "S6" s6_decorrelation "neighbours are not correlated":
-        "correlation of dimensions 0 to 63 with those of the pixels (1, 0), (0, 1), (16, 16), and with the next set's (Ahmed and Wonka)";
+        "correlation of dimensions 0 to 63 with those of the pixels (1, 0), (0, 1), (16, 16), and with the next set's \
+         (Ahmed and Wonka)";
     "S7" s7_convergence "errors fall as the theory says":
-        "root mean square error over scrambles, 2^4 to 2^12 samples: a smooth integrand in 2D and a disk (Owen; Burley)";
+        "root mean square error over scrambles, 2^4 to 2^12 samples: a smooth integrand in 2D and a disk (Owen; \
+         Burley)";
     "S8" s8_seeds_and_counts "other seeds and counts of samples are unbiased":
-        "means over many pixels for counts that are no powers of two, against the integral and between seeds (Welch's test)";
+        "means over many pixels for counts that are no powers of two, against the integral and between seeds (Welch's \
+         test)";
 }
 
 const KINDS: [SamplerKind; 2] = [SamplerKind::Sobol, SamplerKind::Independent];
@@ -55,11 +60,15 @@ fn s1_elementary_intervals(effort: Effort) -> Outcome {
             for start in [0, 5 << k, 1 << 16, 3 << 20] {
                 let points: Vec<_> = (start..start + (1 << k)).map(|i| sampler.sample_4d(pixel, i, set)).collect();
                 single += (0..4).map(|dimension| uneven(&points, |p| digits(p[dimension], k))).sum::<usize>();
-                pairs += (0..=k).map(|a| uneven(&points, |p| digits(p[0], a) << (k - a) | digits(p[1], k - a))).sum::<usize>();
+                pairs += (0..=k)
+                    .map(|a| uneven(&points, |p| digits(p[0], a) << (k - a) | digits(p[1], k - a)))
+                    .sum::<usize>();
             }
         }
     }
-    Outcome::new().none("intervals of one dimension that are empty or shared", single).none("intervals of two dimensions", pairs)
+    Outcome::new()
+        .none("intervals of one dimension that are empty or shared", single)
+        .none("intervals of two dimensions", pairs)
 }
 
 fn s2_any_order(effort: Effort) -> Outcome {
@@ -71,7 +80,8 @@ fn s2_any_order(effort: Effort) -> Outcome {
             let forward: Vec<_> = (0..256).map(|i| sampler.sample_4d(pixel, i % 16, i / 16)).collect();
             for i in (0..256).rev() {
                 let again = Sampler::new(kind, u64::from(case));
-                differ += usize::from(again.sample_4d(again.pixel(10 + case, 20), i % 16, i / 16) != forward[i as usize]);
+                differ +=
+                    usize::from(again.sample_4d(again.pixel(10 + case, 20), i % 16, i / 16) != forward[i as usize]);
             }
             let others = [Sampler::new(kind, u64::from(case) + 1).pixel(10 + case, 20), sampler.pixel(20, 10 + case)];
             alike += others.iter().filter(|&&other| other == pixel && case != 10).count();
@@ -90,8 +100,9 @@ fn s3_range(effort: Effort) -> Outcome {
             || [f32::INFINITY, f32::NEG_INFINITY],
             |[low, high], u| [u.into_iter().fold(low, f32::min), u.into_iter().fold(high, f32::max)],
         );
-        let [least, largest] =
-            extremes.reduce(|| [f32::INFINITY, f32::NEG_INFINITY], |a, b| [a[0].min(b[0]), a[1].max(b[1])]).map(f64::from);
+        let [least, largest] = extremes
+            .reduce(|| [f32::INFINITY, f32::NEG_INFINITY], |a, b| [a[0].min(b[0]), a[1].max(b[1])])
+            .map(f64::from);
         outcome = outcome.within(format!("least, {kind:?}"), least, 0.0, 1e-5).within(
             format!("1 less the largest, {kind:?}"),
             1.0 - largest,
@@ -128,7 +139,8 @@ fn s4_uniformity(effort: Effort) -> Outcome {
             (0..4).for_each(|d| bins[d][digits(u[d], 4)] += 1);
             squares[cell(u[0], u[1])] += 1;
         }
-        uneven += bins.as_flattened().iter().filter(|&&n| n != 64).count() + squares.iter().filter(|&&n| n != 4).count();
+        uneven +=
+            bins.as_flattened().iter().filter(|&&n| n != 64).count() + squares.iter().filter(|&&n| n != 4).count();
     }
     let independent = Sampler::new(SamplerKind::Independent, 3);
     let mut p_values = Vec::new();
@@ -142,8 +154,12 @@ fn s4_uniformity(effort: Effort) -> Outcome {
     for kind in KINDS {
         let sampler = Sampler::new(kind, 11);
         for [a, b] in PAIRS {
-            p_values.push(p_uniform((0..65_536).map(|i| sampler.sample_4d(sampler.pixel(i & 255, i >> 8), 0, 0)).map(|u| [u[a], u[b]])));
-            p_values.push(p_uniform((0..65_536).map(|i| sampler.sample_4d(sampler.pixel(0, 0), 1, i)).map(|u| [u[a], u[b]])));
+            p_values.push(p_uniform(
+                (0..65_536).map(|i| sampler.sample_4d(sampler.pixel(i & 255, i >> 8), 0, 0)).map(|u| [u[a], u[b]]),
+            ));
+            p_values.push(p_uniform(
+                (0..65_536).map(|i| sampler.sample_4d(sampler.pixel(0, 0), 1, i)).map(|u| [u[a], u[b]]),
+            ));
         }
     }
     Outcome::new().none("Sobol: bins with another count than their share", uneven).at_least(
@@ -177,7 +193,11 @@ fn s5_scrambles(effort: Effort) -> Outcome {
     }
     // A Poisson number of that mean exceeds the bound once in a million.
     Outcome::new()
-        .at_most(format!("pixels of {side} x {side} with the scramble of another"), equal, expected + 5.0 * expected.sqrt() + 6.0)
+        .at_most(
+            format!("pixels of {side} x {side} with the scramble of another"),
+            equal,
+            expected + 5.0 * expected.sqrt() + 6.0,
+        )
         .at_least(
             format!("smallest p-value of {} pairs of first samples", p_values.len()),
             p_values.iter().copied().fold(1.0, f64::min),
@@ -216,7 +236,8 @@ fn s6_decorrelation(effort: Effort) -> Outcome {
             .flat_map_iter(|set| {
                 let of = |pixel: PixelSeed, set: u32| SampleSet { pixel, set };
                 let own = of(origin, set);
-                let others = [(1, 0), (0, 1), (16, 16)].map(|(x, y)| correlations(sampler, count, own, of(sampler.pixel(x, y), set), 0));
+                let others = [(1, 0), (0, 1), (16, 16)]
+                    .map(|(x, y)| correlations(sampler, count, own, of(sampler.pixel(x, y), set), 0));
                 let next = [0, 1, 2, 3].map(|shift| correlations(sampler, count, own, of(origin, set + 1), shift));
                 others.into_iter().chain(next).flatten()
             })
@@ -243,8 +264,16 @@ fn integrands() -> [Integrand; 2] {
     // Integrals of u e^-u and v e^(-v/2) over the unit interval.
     let smooth = (1.0 - 2.0 * (-1f64).exp()) * (4.0 - 6.0 * (-0.5f64).exp());
     [
-        Integrand { name: "smooth", f: |u| f64::from(u[0] * u[1]) * (-f64::from(u[0]) - 0.5 * f64::from(u[1])).exp(), exact: smooth },
-        Integrand { name: "disk", f: |u| if u[0] * u[0] + u[1] * u[1] < 0.8 { 1.0 } else { 0.0 }, exact: 0.8 * FRAC_PI_4 },
+        Integrand {
+            name: "smooth",
+            f: |u| f64::from(u[0] * u[1]) * (-f64::from(u[0]) - 0.5 * f64::from(u[1])).exp(),
+            exact: smooth,
+        },
+        Integrand {
+            name: "disk",
+            f: |u| if u[0] * u[0] + u[1] * u[1] < 0.8 { 1.0 } else { 0.0 },
+            exact: 0.8 * FRAC_PI_4,
+        },
     ]
 }
 
@@ -256,7 +285,8 @@ fn errors(kind: SamplerKind, integrand: &Integrand, scrambles: u32) -> Vec<(f64,
         let sum: f64 = (0..1 << k).map(|i| (integrand.f)(sampler.sample_4d(pixel, i, 2))).sum();
         (sum / f64::from(1u32 << k) - integrand.exact).powi(2)
     };
-    let root_mean_square = |k: u32| ((0..scrambles).into_par_iter().map(|s| squared(k, s)).sum::<f64>() / f64::from(scrambles)).sqrt();
+    let root_mean_square =
+        |k: u32| ((0..scrambles).into_par_iter().map(|s| squared(k, s)).sum::<f64>() / f64::from(scrambles)).sqrt();
     (4..=12).map(|k| (f64::from(1u32 << k), root_mean_square(k))).collect()
 }
 
@@ -276,8 +306,10 @@ fn s7_convergence(effort: Effort) -> Outcome {
     let mut curves = Vec::new();
     for integrand in integrands() {
         let limit = if integrand.name == "smooth" { -1.3 } else { -0.70 };
-        let (sobol, independent) =
-            (errors(SamplerKind::Sobol, &integrand, scrambles), errors(SamplerKind::Independent, &integrand, scrambles));
+        let (sobol, independent) = (
+            errors(SamplerKind::Sobol, &integrand, scrambles),
+            errors(SamplerKind::Independent, &integrand, scrambles),
+        );
         outcome = outcome.at_most(format!("slope, {}, Sobol", integrand.name), slope(&sobol), limit).within(
             format!("slope, {}, independent", integrand.name),
             slope(&independent),
@@ -299,7 +331,8 @@ fn s7_convergence(effort: Effort) -> Outcome {
 /// Mean over pixels of the mean of a number of samples, and its squared standard error.
 fn mean_over_pixels(sampler: Sampler, integrand: &Integrand, samples: u32, pixels: u32) -> (f64, f64) {
     let of_pixel = |pixel: u32| {
-        (0..samples).map(|i| (integrand.f)(sampler.sample_4d(sampler.pixel(pixel, 3), i, 0))).sum::<f64>() / f64::from(samples)
+        (0..samples).map(|i| (integrand.f)(sampler.sample_4d(sampler.pixel(pixel, 3), i, 0))).sum::<f64>()
+            / f64::from(samples)
     };
     let values: Vec<f64> = (0..pixels).map(of_pixel).collect();
     let n = f64::from(pixels);
@@ -316,7 +349,9 @@ fn s8_seeds_and_counts(effort: Effort) -> Outcome {
         for kind in KINDS {
             for samples in [1, 3, 7, 24, 100] {
                 let [a, b] = [1, 2].map(|seed| mean_over_pixels(Sampler::new(kind, seed), &integrand, samples, pixels));
-                for (difference, variance) in [(a.0 - integrand.exact, a.1), (b.0 - integrand.exact, b.1), (a.0 - b.0, a.1 + b.1)] {
+                for (difference, variance) in
+                    [(a.0 - integrand.exact, a.1), (b.0 - integrand.exact, b.1), (a.0 - b.0, a.1 + b.1)]
+                {
                     p_values.push(2.0 * normal.sf((difference / variance.sqrt()).abs()));
                 }
                 relative = relative.max((a.0 / integrand.exact - 1.0).abs());

@@ -1,7 +1,8 @@
 //! Scenes, rays at them, every kind of query, and when two hits are the same: for checks that compare accelerators.
 
 use super::geometry::{
-    Rng, cube, grid, instances, meshes, placed_analytic_shapes, ray, ray_through, reach, soup, sphere_mesh, transform, world,
+    Rng, cube, grid, instances, meshes, placed_analytic_shapes, ray, ray_through, reach, soup, sphere_mesh, transform,
+    world,
 };
 use crate::accel::inspect::Inspect;
 use crate::accel::{self, AccelKind, Accelerator, Coherence, EmbreeInfo};
@@ -9,7 +10,7 @@ use crate::bench::bumpy_sphere;
 use crate::geometry::{Geometry, Hit, Instance, Mesh, MeshStep, Object, Shape};
 use crate::id::{ObjectId, ShapeId};
 use crate::math::float::UNIT_ROUNDOFF;
-use crate::math::{Aabb, DAffine3, DMat3, DVec3, Motion, Ray};
+use crate::math::{Aabb, DAffine3, DMat3, DVec3, Motion, Ray, Transform};
 
 /// Checks build over their own geometry, which every accelerator takes.
 const BUILDS: &str = "accelerators build over the geometry of checks";
@@ -21,7 +22,9 @@ pub fn build(kind: AccelKind, geometry: &Geometry) -> Box<dyn Accelerator + '_> 
 
 /// Our own accelerators with their names.
 pub fn own(geometry: &Geometry) -> Vec<(&'static str, Box<dyn Accelerator + '_>)> {
-    ["bvh", "bvh:binary", "kdtree", "kdtree:median", "octree"].map(|name| (name, build(name.parse().expect(BUILDS), geometry))).into()
+    ["bvh", "bvh:binary", "kdtree", "kdtree:median", "octree"]
+        .map(|name| (name, build(name.parse().expect(BUILDS), geometry)))
+        .into()
 }
 
 /// [`own`], Embree, and packets.
@@ -33,8 +36,8 @@ pub fn all(geometry: &Geometry) -> Vec<(&'static str, Box<dyn Accelerator + '_>)
 }
 
 /// Why bounds on Embree's distances are weaker on some processors.
-pub const INEXACT_RECIPROCALS: &str =
-    "on a processor without AVX-512, Embree divides by refined estimates of reciprocals: distances to triangles may be 2^-22 off";
+pub const INEXACT_RECIPROCALS: &str = "on a processor without AVX-512, Embree divides by refined estimates of \
+                                       reciprocals: distances to triangles may be 2^-22 off";
 
 /// The relative error of an accelerator's distances to triangles, from [`all`].
 pub fn distance_error(name: &str) -> f32 {
@@ -81,7 +84,8 @@ pub fn packets(geometry: &Geometry) -> Box<dyn Accelerator + '_> {
 
 /// What every entry point answers to these rays: single, in coherent batches and in incoherent ones.
 pub fn all_answers(accel: &dyn Accelerator, rays: &[Ray]) -> Vec<(Vec<Option<Hit>>, Vec<bool>)> {
-    let mut answers = vec![(rays.iter().map(|r| accel.intersect(r)).collect(), rays.iter().map(|r| accel.occluded(r)).collect())];
+    let mut answers =
+        vec![(rays.iter().map(|r| accel.intersect(r)).collect(), rays.iter().map(|r| accel.occluded(r)).collect())];
     for coherence in [Coherence::Coherent, Coherence::Incoherent] {
         let (mut hits, mut occluded) = (vec![None; rays.len()], vec![false; rays.len()]);
         accel.intersect_batch(rays, &mut hits, coherence);
@@ -89,6 +93,15 @@ pub fn all_answers(accel: &dyn Accelerator, rays: &[Ray]) -> Vec<(Vec<Option<Hit
         answers.push((hits, occluded));
     }
     answers
+}
+
+/// An object that shares a shape with the world, and ids that do not start at zero.
+fn mixed(rng: &mut Rng, placements: &[Transform]) -> Geometry {
+    let soups = [0.3, 0.3, 0.2].map(|size| Shape::Mesh(soup(rng, 50, size)));
+    let mut mixed = instances(soups.into(), placements);
+    mixed.objects[0].shapes.remove(0);
+    mixed.world = vec![ShapeId(0), ShapeId(2)];
+    mixed
 }
 
 /// Scenes with their names, all of them at rest.
@@ -103,7 +116,10 @@ pub fn scenes() -> Vec<(&'static str, Geometry)> {
         ("two soups", meshes(vec![soup(&mut rng, 200, 0.3), soup(&mut rng, 200, 0.1)])),
         ("sphere", meshes(vec![sphere_mesh(DVec3::ZERO, 1.0, 32, 16)])),
         ("far sphere", meshes(vec![sphere_mesh(far, 1.0, 32, 16)])),
-        ("stairs", meshes((0..8).map(|i| cube(DMat3::IDENTITY * 0.125, DVec3::splat(-0.875 + 0.25 * f64::from(i)))).collect())),
+        (
+            "stairs",
+            meshes((0..8).map(|i| cube(DMat3::IDENTITY * 0.125, DVec3::splat(-0.875 + 0.25 * f64::from(i)))).collect()),
+        ),
         ("one triangle", meshes(vec![soup(&mut rng, 1, 1.0)])),
         (
             "hills",
@@ -111,20 +127,21 @@ pub fn scenes() -> Vec<(&'static str, Geometry)> {
                 0.2 * (9.0 * s).sin() * (7.0 * t).cos()
             })]),
         ),
-        ("slivers", meshes(vec![grid(DVec3::new(-1.0, -1.0, 0.0), 2.0 * DVec3::X, DVec3::new(0.3, 0.02, 0.5), 16, |s, t| 0.1 * s * t)])),
+        (
+            "slivers",
+            meshes(vec![grid(DVec3::new(-1.0, -1.0, 0.0), 2.0 * DVec3::X, DVec3::new(0.3, 0.02, 0.5), 16, |s, t| {
+                0.1 * s * t
+            })]),
+        ),
         (
             "instances",
-            instances(vec![Shape::Mesh(soup(&mut rng, 30, 0.4)), Shape::Mesh(cube(DMat3::IDENTITY * 0.5, DVec3::ZERO))], &placements),
+            instances(
+                vec![Shape::Mesh(soup(&mut rng, 30, 0.4)), Shape::Mesh(cube(DMat3::IDENTITY * 0.5, DVec3::ZERO))],
+                &placements,
+            ),
         ),
     ];
-    // An object that shares a shape with the world, and ids that do not start at zero.
-    let mut mixed = instances(
-        vec![Shape::Mesh(soup(&mut rng, 50, 0.3)), Shape::Mesh(soup(&mut rng, 50, 0.3)), Shape::Mesh(soup(&mut rng, 50, 0.2))],
-        &placements[..3],
-    );
-    mixed.objects[0].shapes.remove(0);
-    mixed.world = vec![ShapeId(0), ShapeId(2)];
-    scenes.push(("mixed", mixed));
+    scenes.push(("mixed", mixed(&mut rng, &placements[..3])));
     let analytic = placed_analytic_shapes(&mut rng, DVec3::ZERO);
     scenes.push(("analytic", world(analytic.clone())));
     scenes.push(("far analytic", world(placed_analytic_shapes(&mut rng, far))));
@@ -133,7 +150,11 @@ pub fn scenes() -> Vec<(&'static str, Geometry)> {
     scenes.push(("bumpy sphere", meshes(vec![bumpy_sphere(1_000)])));
     scenes.push(("tiny sphere", meshes(vec![sphere_mesh(DVec3::ZERO, 1e-6, 32, 16)])));
     // Every hit is a tie.
-    let twice = || Shape::Mesh(grid(DVec3::new(-1.0, -1.0, 0.0), 2.0 * DVec3::X, 2.0 * DVec3::Y, 8, |s, t| 0.3 * (7.0 * s * t).sin()));
+    let twice = || {
+        Shape::Mesh(grid(DVec3::new(-1.0, -1.0, 0.0), 2.0 * DVec3::X, 2.0 * DVec3::Y, 8, |s, t| {
+            0.3 * (7.0 * s * t).sin()
+        }))
+    };
     scenes.push(("overlapping", world(vec![twice(), twice()])));
     scenes
 }
@@ -144,8 +165,10 @@ fn place(rng: &mut Rng, reach: f64) -> DAffine3 {
 
 /// Through three places, or such a way carried along another.
 pub fn motion(rng: &mut Rng) -> Motion {
-    let mut keyframed =
-        || Motion::keyframed(&[(0.0, place(rng, 1.5)), (0.4, place(rng, 1.5)), (1.0, place(rng, 1.5))]).expect("maps without mirroring");
+    let mut keyframed = || {
+        Motion::keyframed(&[(0.0, place(rng, 1.5)), (0.4, place(rng, 1.5)), (1.0, place(rng, 1.5))])
+            .expect("maps without mirroring")
+    };
     let (outer, inner) = (keyframed(), keyframed());
     if rng.unit() < 0.5 { outer.after(&inner) } else { outer }
 }
@@ -154,7 +177,11 @@ pub fn motion(rng: &mut Rng) -> Motion {
 pub fn deforming(rng: &mut Rng, triangles: usize) -> Mesh {
     let start = soup(rng, triangles, 0.4);
     let mut step = || MeshStep {
-        positions: start.positions().iter().map(|p| (DVec3::from(p.map(f64::from)) + 0.5 * rng.cube()).as_vec3().to_array()).collect(),
+        positions: start
+            .positions()
+            .iter()
+            .map(|p| (DVec3::from(p.map(f64::from)) + 0.5 * rng.cube()).as_vec3().to_array())
+            .collect(),
         normals: None,
     };
     let later = vec![step(), step()];
@@ -172,7 +199,13 @@ pub fn moving_scene(rng: &mut Rng) -> Geometry {
     let objects = (0..moving).map(|i| Object { shapes: vec![ShapeId::new(i)] }).collect();
     let mut instances: Vec<_> = (0..moving).filter_map(|i| Instance::moving(ObjectId::new(i), motion(rng))).collect();
     instances.extend(Instance::moving(ObjectId(0), Motion::constant(place(rng, 1.5))));
-    Geometry { shapes, world: vec![ShapeId::new(moving), ShapeId::new(moving + 1)], objects, instances, ..Geometry::default() }
+    Geometry {
+        shapes,
+        world: vec![ShapeId::new(moving), ShapeId::new(moving + 1)],
+        objects,
+        instances,
+        ..Geometry::default()
+    }
 }
 
 /// Rays of each kind that a path tracer sends: from a camera, onwards from what those hit, and from there to a point.
@@ -207,8 +240,11 @@ pub fn at_times(rng: &mut Rng, mut rays: Vec<Ray>) -> Vec<Ray> {
 /// Random, axis-parallel and grazing rays at a scene, with unit and other directions.
 pub fn test_rays(rng: &mut Rng, geometry: &Geometry, count: usize) -> Vec<Ray> {
     let bounds = geometry.bounds();
-    let (center, half) =
-        if bounds.is_empty() { (DVec3::ZERO, DVec3::ONE) } else { (bounds.center().as_dvec3(), 0.5 * bounds.size().as_dvec3()) };
+    let (center, half) = if bounds.is_empty() {
+        (DVec3::ZERO, DVec3::ONE)
+    } else {
+        (bounds.center().as_dvec3(), 0.5 * bounds.size().as_dvec3())
+    };
     let size = half.max_element();
     let mut next = |i: usize| {
         let inside = center + half * rng.cube();
@@ -217,7 +253,8 @@ pub fn test_rays(rng: &mut Rng, geometry: &Geometry, count: usize) -> Vec<Ray> {
             1 => ray_through(center + rng.direction() * size * 4.0, inside),
             2 => {
                 // One or two zero components, with either sign.
-                let axis = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(0.6, -0.8, 0.0), DVec3::new(-0.0, 0.6, 0.8)][rng.below(5)];
+                let axis = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(0.6, -0.8, 0.0), DVec3::new(-0.0, 0.6, 0.8)]
+                    [rng.below(5)];
                 let axis = if rng.unit() < 0.5 { -axis } else { axis };
                 ray(inside - axis * 3.0 * size, axis)
             }
@@ -235,8 +272,11 @@ pub fn test_rays(rng: &mut Rng, geometry: &Geometry, count: usize) -> Vec<Ray> {
 /// Camera rays: blocks of 4 by 4 pixels in order.
 pub fn camera_rays(geometry: &Geometry, resolution: usize) -> Vec<Ray> {
     let bounds = geometry.bounds();
-    let (center, size) =
-        if bounds.is_empty() { (DVec3::ZERO, 1.0) } else { (bounds.center().as_dvec3(), f64::from(bounds.size().max_element())) };
+    let (center, size) = if bounds.is_empty() {
+        (DVec3::ZERO, 1.0)
+    } else {
+        (bounds.center().as_dvec3(), f64::from(bounds.size().max_element()))
+    };
     let eye = center + DVec3::new(0.9, 1.1, 0.8) * size;
     let (right, up) = (DVec3::new(-0.77, 0.63, 0.0), DVec3::new(-0.31, -0.38, 0.87));
     let blocks = (resolution / 4).pow(2);
@@ -256,7 +296,9 @@ pub fn camera_rays(geometry: &Geometry, resolution: usize) -> Vec<Ray> {
 pub fn same(geometry: &Geometry, ray: &Ray, a: &Hit, b: &Hit) -> bool {
     let length = f64::from(ray.direction.length());
     let slack = |hit: &Hit| {
-        let seen = geometry.interaction(ray, hit).map(|si| (f64::from(si.n_g.dot(ray.direction).abs()) / length, f64::from(si.error)));
+        let seen = geometry
+            .interaction(ray, hit)
+            .map(|si| (f64::from(si.n_g.dot(ray.direction).abs()) / length, f64::from(si.error)));
         let (cosine, error) = seen.unwrap_or((1.0, 0.0));
         let off_plane = 4.0 * UNIT_ROUNDOFF * reach(geometry, ray, hit) + error;
         16.0 * UNIT_ROUNDOFF * f64::from(hit.t) + off_plane / (length * cosine.max(1e-6))

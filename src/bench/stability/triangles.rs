@@ -2,7 +2,9 @@
 
 use std::f64::consts::PI;
 
-use super::geometry::{Rng, closest, cube, grid, instances, mesh, meshes, ray, ray_through, sphere_mesh, transform, triangle, world};
+use super::geometry::{
+    Rng, closest, cube, grid, instances, mesh, meshes, ray, ray_through, sphere_mesh, transform, triangle, world,
+};
 use super::{Effort, Outcome};
 use crate::accel::{self, AccelKind, Accelerator, LinearAccel};
 use crate::geometry::{Analytic, Geometry, Mesh, MeshStep, Quad, Shape, SurfaceInteraction, TransformedShape};
@@ -12,27 +14,40 @@ use crate::math::{DMat3, DVec3, Ray, Transform, Vec3};
 
 checks! {
     "A1" a1_triangle_hits "accuracy of triangle hits":
-        "unit triangle, rays from one unit away to points with barycentrics of at least 1e-3 (Embree, verify TriangleHitTest)";
+        "unit triangle, rays from one unit away to points with barycentrics of at least 1e-3 (Embree, verify \
+         TriangleHitTest)";
     "A2" a2_quad_hits "accuracy of hits of a quad":
-        "unit square as an analytic shape, rays from one unit away to points at least 1e-3 from its edges (Embree, verify QuadHitTest)";
+        "unit square as an analytic shape, rays from one unit away to points at least 1e-3 from its edges (Embree, \
+         verify QuadHitTest)";
     "A3" a3_watertight_meshes "closed sphere and plane, at rest and with two equal time steps":
-        "sphere of radius 2 around the origin and far away, plane of 12 x 12 far away; random rays from within 0.5 of the centre and at the plane, closest and any hit (Embree, verify WatertightTest)";
+        "sphere of radius 2 around the origin and far away, plane of 12 x 12 far away; random rays from within 0.5 of \
+         the centre and at the plane, closest and any hit (Embree, verify WatertightTest)";
     "A4" a4_edges "rays at edges":
-        "closed sphere, scale 1e-6 to 1e6, 0 to 1e7 radii from the origin; rays from the centre to random points of edges, closest and any hit (Woop, Benthin, Wald, \"Watertight Ray/Triangle Intersection\")";
+        "closed sphere, scale 1e-6 to 1e6, 0 to 1e7 radii from the origin; rays from the centre to random points of \
+         edges, closest and any hit (Woop, Benthin, Wald, \"Watertight Ray/Triangle Intersection\")";
     "A5" a5_vertices "rays at vertices":
-        "closed sphere; rays from the centre and from around it to vertices, closest and any hit (pbrt, Triangle.Watertight). Embree computes edge functions in f32 and may lose the vertex itself: 3 % is a picture's set of measure zero";
+        "closed sphere; rays from the centre and from around it to vertices, closest and any hit (pbrt, \
+         Triangle.Watertight). Embree computes edge functions in f32 and may lose the vertex itself: 3 % is a \
+         picture's set of measure zero";
     "A6" a6_bumpy_mesh "closed mesh with bumps":
-        "16 x 16 sphere mesh with radii of 1 to 6, random rays from near the centre, closest and any hit (pbrt, Triangle.Watertight)";
+        "16 x 16 sphere mesh with radii of 1 to 6, random rays from near the centre, closest and any hit (pbrt, \
+         Triangle.Watertight)";
     "A7" a7_small_far_triangles "small triangles far away":
-        "tilted plane of 100 x 100 cells of size 1, origins in a cube of half size 1e6, rays at the centroids of triangles, at least 0.1 rad from grazing (Embree, verify SmallTriangleHitTest). A direction in f32 misses the centroid by up to 0.06 / sin: the other accelerators must find the triangle that the rounded ray meets";
+        "tilted plane of 100 x 100 cells of size 1, origins in a cube of half size 1e6, rays at the centroids of \
+         triangles, at least 0.1 rad from grazing (Embree, verify SmallTriangleHitTest). A direction in f32 misses the \
+         centroid by up to 0.06 / sin: the other accelerators must find the triangle that the rounded ray meets";
     "A8" a8_solid_angle "solid angle of a triangle":
-        "triangles with corners within 10 of a point: 65536 points by area, and random directions, against van Oosterom and Strackee's formula (pbrt, Triangle.SolidAngle)";
+        "triangles with corners within 10 of a point: 65536 points by area, and random directions, against van \
+         Oosterom and Strackee's formula (pbrt, Triangle.SolidAngle)";
     "A9" a9_bad_cases "slivers that are wrong in other programs":
-        "a triangle without area (pbrt, Triangle.BadCases) and one that is a line in f32, with a ray along it: no hit, or one with numbers";
+        "a triangle without area (pbrt, Triangle.BadCases) and one that is a line in f32, with a ray along it: no hit, \
+         or one with numbers";
     "A10" a10_both_sides "both sides of a triangle":
-        "rays at a triangle from both sides, in the world and in a mirrored instance: all hit, the normal distinguishes the sides (Embree, verify BackfaceCullingTest)";
+        "rays at a triangle from both sides, in the world and in a mirrored instance: all hit, the normal \
+         distinguishes the sides (Embree, verify BackfaceCullingTest)";
     "A11" a11_axes "rays along axes":
-        "inside of a cube, in the planes of faces' diagonals and next to faces, with zeros and negative zeros in the direction, closest and any hit";
+        "inside of a cube, in the planes of faces' diagonals and next to faces, with zeros and negative zeros in the \
+         direction, closest and any hit";
 }
 
 /// Where Embree's own watertightness test stands: coordinates are quantised to 1/64 there.
@@ -66,7 +81,10 @@ impl Tally {
         self.rays += rays.len();
         for (name, accel) in accels {
             let rays = if *name == "linear" { &rays[..rays.len() / 8] } else { rays };
-            let lost: usize = rays.iter().map(|ray| usize::from(accel.intersect(ray).is_none()) + usize::from(!accel.occluded(ray))).sum();
+            let lost: usize = rays
+                .iter()
+                .map(|ray| usize::from(accel.intersect(ray).is_none()) + usize::from(!accel.occluded(ray)))
+                .sum();
             match self.lost.iter_mut().find(|(known, _)| known == name) {
                 Some((_, sum)) => *sum += lost,
                 None => self.lost.push((name, lost)),
@@ -231,7 +249,8 @@ fn a6_bumpy_mesh(effort: Effort) -> Outcome {
     let mut tally = Tally::default();
     for _ in 0..10 {
         let smooth = sphere_mesh(DVec3::ZERO, 1.0, 16, 16);
-        let positions = smooth.positions().iter().map(|p| DVec3::from_array(p.map(f64::from)) * (1.0 + 5.0 * rng.unit()));
+        let positions =
+            smooth.positions().iter().map(|p| DVec3::from_array(p.map(f64::from)) * (1.0 + 5.0 * rng.unit()));
         let bumpy = mesh(&positions.collect::<Vec<_>>(), smooth.triangles().to_vec());
         let geometry = meshes(vec![bumpy]);
         let next = || ray(0.25 * rng.cube(), rng.direction());
@@ -296,7 +315,10 @@ fn a7_small_far_triangles(effort: Effort) -> Outcome {
         // Corners less the origin have one unit of roundoff, the edge functions made of them up to seven more.
         .at_most("embree: distance of the ray from the triangle found, units of roundoff of the origin", off, 8.0)
         .record("embree: fraction with another triangle than aimed at", other as f64 / f64::from(rays))
-        .short("Embree forms edge functions in f32 from corners less the origin, which are 0.03 units off at 1e6; the catalogue requires 99.998 % right, which f32 rays cannot name")
+        .short(
+            "Embree forms edge functions in f32 from corners less the origin, which are 0.03 units off at 1e6; the \
+             catalogue requires 99.998 % right, which f32 rays cannot name",
+        )
 }
 
 /// The solid angle of a triangle seen from the origin (van Oosterom and Strackee, "The Solid Angle of a Plane
@@ -346,18 +368,25 @@ fn a8_solid_angle(effort: Effort) -> Outcome {
 }
 
 fn a9_bad_cases(_: Effort) -> Outcome {
-    let collinear =
-        [[-1113.45459, -79.049614, -56.2431908], [-1113.45459, -87.0922699, -56.2431908], [-1113.45459, -79.2090149, -56.2431908]];
-    let across =
-        Ray { t_max: 0.9999, ..Ray::new(Vec3::new(-1_081.479_2, 99.999_95, 87.770_11), Vec3::new(-32.107_3, -183.355_87, -144.607_64)) };
-    let line = [[-1113.4546, -79.049614, -56.24319], [-1113.4546, -79.049614, -56.24319], [-1113.4547, -79.04961, -56.24319]];
+    let collinear = [
+        [-1113.45459, -79.049614, -56.2431908],
+        [-1113.45459, -87.0922699, -56.2431908],
+        [-1113.45459, -79.2090149, -56.2431908],
+    ];
+    let across = Ray {
+        t_max: 0.9999,
+        ..Ray::new(Vec3::new(-1_081.479_2, 99.999_95, 87.770_11), Vec3::new(-32.107_3, -183.355_87, -144.607_64))
+    };
+    let line =
+        [[-1113.4546, -79.049614, -56.24319], [-1113.4546, -79.049614, -56.24319], [-1113.4547, -79.04961, -56.24319]];
     let along = Ray::new(Vec3::ZERO, Vec3::new(-1_113.454_6, -79.049_61, -56.243_19));
     let (mut hits, mut not_finite) = (0, 0);
     for (corners, ray) in [(collinear, across), (line, along)] {
         let [a, b, c] = corners.map(DVec3::from_array);
         let mesh = triangle(a, b, c);
         let sample = mesh.triangle_points(PrimId(0)).sample([0.3, 0.4]);
-        not_finite += usize::from(sample.is_some_and(|s| !(s.p.is_finite() && s.n.is_finite() && s.pdf_area.is_finite())));
+        not_finite +=
+            usize::from(sample.is_some_and(|s| !(s.p.is_finite() && s.n.is_finite() && s.pdf_area.is_finite())));
         let geometry = meshes(vec![mesh]);
         for (_, accel) in accelerators(&geometry) {
             hits += usize::from(accel.intersect(&ray).is_some()) + usize::from(accel.occluded(&ray));
@@ -369,10 +398,13 @@ fn a9_bad_cases(_: Effort) -> Outcome {
 fn a10_both_sides(effort: Effort) -> Outcome {
     let mut rng = Rng::new(10);
     let (mut missed, mut wrong_side) = (0, 0);
-    let mirror = transform(DMat3::from_diagonal(DVec3::new(-1.5, 0.8, 1.2)) * rng.rotation(), DVec3::new(3.0, 1.0, -2.0));
+    let mirror =
+        transform(DMat3::from_diagonal(DVec3::new(-1.5, 0.8, 1.2)) * rng.rotation(), DVec3::new(3.0, 1.0, -2.0));
     let (a, b, c) = (rng.cube(), rng.cube(), rng.cube());
     let shape = || Shape::Mesh(triangle(a, b, c));
-    for (geometry, placement) in [(world(vec![shape()]), Transform::IDENTITY), (instances(vec![shape()], &[mirror]), mirror)] {
+    for (geometry, placement) in
+        [(world(vec![shape()]), Transform::IDENTITY), (instances(vec![shape()], &[mirror]), mirror)]
+    {
         let accels = accelerators(&geometry);
         let front = placement.normal((b - a).cross(c - a)).normalize();
         for i in 0..effort.pick(1_000, 100_000) {
@@ -383,7 +415,8 @@ fn a10_both_sides(effort: Effort) -> Outcome {
             for (_, accel) in &accels {
                 let found: Option<SurfaceInteraction> = closest(&**accel, &geometry, &ray).found;
                 missed += usize::from(found.is_none()) + usize::from(!accel.occluded(&ray));
-                wrong_side += usize::from(found.is_some_and(|si| si.n_g.dot(ray.direction) * side.dot(front) as f32 >= 0.0));
+                wrong_side +=
+                    usize::from(found.is_some_and(|si| si.n_g.dot(ray.direction) * side.dot(front) as f32 >= 0.0));
             }
         }
     }
@@ -392,7 +425,8 @@ fn a10_both_sides(effort: Effort) -> Outcome {
     for (_, accel) in accelerators(&geometry) {
         for _ in 0..effort.pick(200, 20_000) {
             let ray = ray(0.5 * rng.cube(), rng.direction());
-            wrong_side += usize::from(closest(&*accel, &geometry, &ray).found.is_none_or(|si| si.n_g.dot(ray.direction) <= 0.0));
+            wrong_side +=
+                usize::from(closest(&*accel, &geometry, &ray).found.is_none_or(|si| si.n_g.dot(ray.direction) <= 0.0));
         }
     }
     Outcome::new().none("missed", missed).none("normals on the wrong side", wrong_side)
@@ -406,9 +440,12 @@ fn a11_axes(effort: Effort) -> Outcome {
     for x in places.clone() {
         for y in places.clone() {
             for zero in [0.0, -0.0] {
-                for d in
-                    [DVec3::new(zero, zero, 1.0), DVec3::new(zero, 1.0, zero), DVec3::new(-1.0, zero, zero), DVec3::new(-1.0, 1.0, zero)]
-                {
+                for d in [
+                    DVec3::new(zero, zero, 1.0),
+                    DVec3::new(zero, 1.0, zero),
+                    DVec3::new(-1.0, zero, zero),
+                    DVec3::new(-1.0, 1.0, zero),
+                ] {
                     rays.push(ray(DVec3::new(x, y, 0.25), d));
                 }
             }

@@ -67,11 +67,19 @@ pub fn shape_vectors(text: &str) -> impl Iterator<Item = ShapeVector> {
         let rest: Vec<&str> = words.collect();
         let point = |at: usize| DVec3::new(f64_of(rest[at]), f64_of(rest[at + 1]), f64_of(rest[at + 2]));
         let hit = (rest.len() > 3).then(|| (f64_of(rest[3]), point(4)));
-        ShapeVector { ray, center: point(0), hit, condition: rest.get(7).map_or(0.0, |word| word.parse().expect(VALID)) }
+        ShapeVector {
+            ray,
+            center: point(0),
+            hit,
+            condition: rest.get(7).map_or(0.0, |word| word.parse().expect(VALID)),
+        }
     })
 }
 
 /// The rays of one of [`PROFILES`].
 pub fn revolution_vectors(text: &str) -> impl Iterator<Item = RevolutionVector> {
-    lines(text).map(|mut words| RevolutionVector { ray: Ray::new(f32s(&mut words), f32s(&mut words)), hits: words.map(f64_of).collect() })
+    lines(text).map(|mut words| RevolutionVector {
+        ray: Ray::new(f32s(&mut words), f32s(&mut words)),
+        hits: words.map(f64_of).collect(),
+    })
 }

@@ -8,7 +8,9 @@ use steradian::accel::{self, AccelKind};
 use steradian::bench::agreement::{describe, parse_ray};
 use steradian::bench::report::Report;
 use steradian::bench::stability::{self, CheckReport, Effort, StabilityReport};
-use steradian::bench::{Machine, Options, ReportsOptions, SceneReport, Watch, bench_reports, bench_scaling, bench_scene, record};
+use steradian::bench::{
+    Machine, Options, ReportsOptions, SceneReport, Watch, bench_reports, bench_scaling, bench_scene, record,
+};
 use steradian::render::{Overrides, Settings};
 use steradian::{Error, Result, compile};
 
@@ -49,7 +51,10 @@ fn accel(arguments: &BenchAccelArgs) -> Result<u8> {
         }
         watch.step(&format!("{}: loading", path.display()));
         let imported = scene::load(path, &arguments.import, Verbosity { quiet: arguments.quiet, verbose: 0 })?;
-        let settings = Settings::new(&imported.desc, &Overrides { default_outputs: vec!["unused.exr".into()], ..Overrides::default() })?;
+        let settings = Settings::new(
+            &imported.desc,
+            &Overrides { default_outputs: vec!["unused.exr".into()], ..Overrides::default() },
+        )?;
         let scene = compile::compile_from(&imported.desc, imported.source(path))?;
         watch.step(&format!("{}: recording rays", path.display()));
         let recorder = accel::build(AccelKind::EMBREE, &scene.geometry, 0)?;
@@ -91,7 +96,8 @@ fn reports(arguments: &BenchReportsArgs) -> Result<u8> {
     let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt, lines: false };
     let defaults = ReportsOptions::default();
     let tests = if arguments.full { u64::MAX } else { defaults.tests };
-    let report = bench_reports(&ReportsOptions { size: arguments.size, rounds: arguments.rounds as usize, tests }, &watch)?;
+    let report =
+        bench_reports(&ReportsOptions { size: arguments.size, rounds: arguments.rounds as usize, tests }, &watch)?;
     watch.bar.finish_and_clear();
     match &arguments.out {
         Some(folder) => report.write_to(folder)?,
@@ -159,7 +165,11 @@ fn options(arguments: &BenchAccelArgs) -> Options {
     let defaults = Options::default();
     Options {
         accels: if arguments.accel.is_empty() { defaults.accels } else { arguments.accel.clone() },
-        threads: if arguments.threads.is_empty() { defaults.threads } else { arguments.threads.iter().map(|&n| n as usize).collect() },
+        threads: if arguments.threads.is_empty() {
+            defaults.threads
+        } else {
+            arguments.threads.iter().map(|&n| n as usize).collect()
+        },
         rounds: arguments.rounds as usize,
         ..defaults
     }

@@ -111,12 +111,18 @@ fn variants(arguments: &BenchErrorArgs, desc: &SceneDesc) -> Result<Vec<Variant>
                             part(&arguments.integrator, integrator.and_then(name)),
                             part(&arguments.sampler, sampler.and_then(name)),
                             part(&arguments.strategy, strategy.and_then(name)),
-                            part(&arguments.guiding, guiding.map(|on| if on { "guided".to_owned() } else { "not guided".to_owned() })),
+                            part(
+                                &arguments.guiding,
+                                guiding.map(|on| if on { "guided".to_owned() } else { "not guided".to_owned() }),
+                            ),
                             part(&arguments.accel, accel.map(|accel| accel.to_string())),
                         ];
                         let parts: Vec<String> = parts.into_iter().flatten().collect();
                         let name = if parts.is_empty() { "steradian".to_owned() } else { parts.join(", ") };
-                        variants.push(Variant { name, subject: Subject::Steradian(Box::new(Settings::new(desc, &overrides)?)) });
+                        variants.push(Variant {
+                            name,
+                            subject: Subject::Steradian(Box::new(Settings::new(desc, &overrides)?)),
+                        });
                     }
                 }
             }
@@ -146,15 +152,20 @@ fn name(value: impl Serialize) -> Option<String> {
 
 /// A reference of another size is found before the first render.
 fn check_size(arguments: &BenchErrorArgs, variants: &[Variant], reference: &Standard) -> Result<()> {
-    let (Standard::File(file, image), Some(Variant { subject: Subject::Steradian(settings), .. })) = (reference, variants.first()) else {
+    let (Standard::File(file, image), Some(Variant { subject: Subject::Steradian(settings), .. })) =
+        (reference, variants.first())
+    else {
         return Ok(());
     };
     let [r, s] = [image.crop, settings.crop];
     if [r.width, r.height] == [s.width, s.height] {
         return Ok(());
     }
-    let hint =
-        if s.width * r.height == s.height * r.width { format!(" (--size {}x{} would fit)", r.width, r.height) } else { String::new() };
+    let hint = if s.width * r.height == s.height * r.width {
+        format!(" (--size {}x{} would fit)", r.width, r.height)
+    } else {
+        String::new()
+    };
     let scene = Path::new(&arguments.scene).display();
     Err(Error::Usage(format!(
         "{}: the reference has {}x{} pixels, {scene} {}x{}{hint}",

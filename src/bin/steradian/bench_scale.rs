@@ -23,7 +23,8 @@ pub fn run(arguments: &BenchScaleArgs) -> Result<u8> {
         std::fs::create_dir_all(folder).map_err(|e| Error::Output { file: folder.clone(), message: e.to_string() })?;
         output::check_creatable(&folder.join("scale.json"))?;
     }
-    let program = std::env::current_exe().map_err(|e| Error::Internal(format!("where this program lies is not known: {e}")))?;
+    let program =
+        std::env::current_exe().map_err(|e| Error::Internal(format!("where this program lies is not known: {e}")))?;
     let program = || {
         let mut command = Command::new(&program);
         command.args(["bench", ONE_CASE]);

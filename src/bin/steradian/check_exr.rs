@@ -83,7 +83,10 @@ fn describe(findings: &[&(String, Finding)], files: usize, all: bool) -> Vec<Str
             let rest = findings.len() - shown;
             let examples = findings[..shown].iter().map(|found| format!("    {}: {}", place(found), found.1.what));
             let more = (rest > 0).then(|| format!("    ... and {rest} more (-v for all)"));
-            std::iter::once(format!("{severity} {rule}: {} times{of_files}", findings.len())).chain(examples).chain(more).collect()
+            std::iter::once(format!("{severity} {rule}: {} times{of_files}", findings.len()))
+                .chain(examples)
+                .chain(more)
+                .collect()
         }
     };
     lines.extend([format!("    {effect}"), format!("    mend: {mend}")]);
@@ -118,7 +121,10 @@ mod tests {
             "    It is read wrongly",
             "    mend: Store floats",
         ];
-        assert_eq!((&many[..], &mild[0][..]), (&expected.map(str::to_owned)[..], "a.exr: part 0 x: warning mild: x is half"));
+        assert_eq!(
+            (&many[..], &mild[0][..]),
+            (&expected.map(str::to_owned)[..], "a.exr: part 0 x: warning mild: x is half")
+        );
         assert_eq!(lines(true)[1].len(), 43);
     }
 }

@@ -18,7 +18,8 @@ pub fn run(arguments: &CompareArgs) -> Result<()> {
     if arguments.json {
         return text::print_json(&value);
     }
-    let psnr = comparison.psnr.map_or("infinite".to_owned(), |psnr| format!("{psnr:.2} dB (peak {})", round(comparison.peak)));
+    let psnr =
+        comparison.psnr.map_or("infinite".to_owned(), |psnr| format!("{psnr:.2} dB (peak {})", round(comparison.peak)));
     let mut lines = json!({ "size": format!("{}x{}", comparison.width, comparison.height), "psnr": psnr });
     for key in ["mse", "relmse", "relmse_trimmed", "mean_ratio", "nan", "inf"] {
         lines[key] = rounded(&value[key]);
@@ -29,7 +30,10 @@ pub fn run(arguments: &CompareArgs) -> Result<()> {
 /// Reads a picture in linear light.
 pub fn read(path: &Path) -> Result<Image> {
     if Format::from_path(path).is_ok_and(|format| format != Format::Exr) {
-        return Err(Error::Usage(format!("{}: only EXR files are compared, since only they hold linear light", path.display())));
+        return Err(Error::Usage(format!(
+            "{}: only EXR files are compared, since only they hold linear light",
+            path.display()
+        )));
     }
     output::read_exr(path)
 }

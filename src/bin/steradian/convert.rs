@@ -13,7 +13,12 @@ pub fn run(arguments: &ConvertArgs, mut uses: FileUses) -> Result<()> {
     let verbosity = Verbosity { quiet: arguments.quiet, verbose: arguments.verbose };
     let imported = scene::load(&arguments.input, &arguments.import, verbosity)?;
     let originals = if arguments.link { Originals::Link } else { Originals::Copy };
-    arguments.import.report.iter().filter(|path| !files::is_stdout(path)).try_for_each(|path| uses.write(path, "--report"))?;
+    arguments
+        .import
+        .report
+        .iter()
+        .filter(|path| !files::is_stdout(path))
+        .try_for_each(|path| uses.write(path, "--report"))?;
     let count = convert::write_scene(&imported, &arguments.input, &arguments.output, originals, uses)?;
     if !arguments.quiet {
         let files = if count == 1 { "1 file".to_owned() } else { format!("{count} files") };

@@ -62,18 +62,23 @@ pub fn run(arguments: &DenoiseArgs, mut uses: FileUses) -> Result<()> {
         task.check()?;
     }
     let denoiser = Denoiser::open(arguments.oidn.oidn_library.as_deref(), arguments.threads)?;
-    let options =
-        FileOptions { albedo: arguments.albedo.clone(), normal: arguments.normal.clone(), without_features: arguments.no_features };
+    let options = FileOptions {
+        albedo: arguments.albedo.clone(),
+        normal: arguments.normal.clone(),
+        without_features: arguments.no_features,
+    };
     for task in &tasks {
         let report = denoise_file(&denoiser, &task.input, &task.output, &options)?;
         if !task.also.is_empty() {
             let image = output::read_exr(&task.output)?;
-            task.also.iter().try_for_each(|path| output::write_png(path, &image, arguments.exposure, arguments.view))?;
+            task.also
+                .iter()
+                .try_for_each(|path| output::write_png(path, &image, arguments.exposure, arguments.view))?;
         }
         let input = task.input.display();
         if shares_samples(&task.input) {
-            let message = "its pixels share samples, and a denoiser takes such noise for texture: render with --denoise, or with \
-                           \"samples\": \"importance\" in film.filter";
+            let message = "its pixels share samples, and a denoiser takes such noise for texture: render with \
+                           --denoise, or with \"samples\": \"importance\" in film.filter";
             log::message(Level::Warning, &format!("{input}: {message}"));
         }
         warnings(&report).iter().for_each(|warning| log::message(Level::Warning, &format!("{input}: {warning}")));
@@ -90,7 +95,8 @@ pub fn run(arguments: &DenoiseArgs, mut uses: FileUses) -> Result<()> {
 
 /// Whether a file's recipe has a pixel filter that shares samples.
 fn shares_samples(file: &Path) -> bool {
-    let filter = output::read_settings(file).ok().and_then(|provenance| provenance.pointer("/settings/filter").cloned());
+    let filter =
+        output::read_settings(file).ok().and_then(|provenance| provenance.pointer("/settings/filter").cloned());
     filter.and_then(|filter| serde_json::from_value(filter).ok()).is_some_and(|desc| Filter::new(&desc).is_shared())
 }
 
@@ -137,9 +143,12 @@ struct Task {
 impl Task {
     /// A slip in a name is found before the work, not after it.
     fn check(&self) -> Result<()> {
-        for (path, format) in [(&self.output, Format::Exr)].into_iter().chain(self.also.iter().map(|path| (path, Format::Png))) {
+        for (path, format) in
+            [(&self.output, Format::Exr)].into_iter().chain(self.also.iter().map(|path| (path, Format::Png)))
+        {
             if Format::from_path(path)? != format {
-                let expected = if format == Format::Exr { "an .exr file, which holds all layers" } else { "a .png file" };
+                let expected =
+                    if format == Format::Exr { "an .exr file, which holds all layers" } else { "a .png file" };
                 return Err(Error::Usage(format!("output {} is to be {expected}", path.display())));
             }
             output::check_writable(path)?;
@@ -156,13 +165,18 @@ fn tasks(arguments: &DenoiseArgs) -> Result<Vec<Task>> {
         return Ok(vec![Task { input: input.clone(), output: arguments.output.clone(), also: arguments.also.clone() }]);
     };
     if let Some(other) = others.into_iter().find(|path| whole(path)) {
-        return Err(Error::Usage(format!("{} names a sequence, so {} needs #### for the frame, too", input.display(), other.display())));
+        return Err(Error::Usage(format!(
+            "{} names a sequence, so {} needs #### for the frame, too",
+            input.display(),
+            other.display()
+        )));
     }
     let frames = pattern.frames()?;
     if frames.is_empty() {
         return Err(Error::Missing { file: input.clone(), message: "there is no frame of this sequence".to_owned() });
     }
-    let fill = |path: &Path, frame: u64| Pattern::new(path).map_or_else(|| path.to_owned(), |pattern| pattern.file(frame));
+    let fill =
+        |path: &Path, frame: u64| Pattern::new(path).map_or_else(|| path.to_owned(), |pattern| pattern.file(frame));
     let task = |frame| Task {
         input: pattern.file(frame),
         output: fill(&arguments.output, frame),
@@ -195,7 +209,8 @@ impl Pattern {
     /// The frames that are there, in order.
     fn frames(&self) -> Result<Vec<u64>> {
         let folder = if self.folder.as_os_str().is_empty() { Path::new(".") } else { &self.folder };
-        let entries = folder.read_dir().map_err(|e| Error::Missing { file: folder.to_owned(), message: e.to_string() })?;
+        let entries =
+            folder.read_dir().map_err(|e| Error::Missing { file: folder.to_owned(), message: e.to_string() })?;
         let number = |name: &str| {
             let digits = name.strip_prefix(&self.before)?.strip_suffix(&self.after)?;
             let frame: u64 = digits.bytes().all(|b| b.is_ascii_digit()).then(|| digits.parse().ok())??;

@@ -77,7 +77,8 @@ fn job(arguments: &JobArgs) -> Result<Job> {
     let name: String = stem.replace(['#', '%'], "").trim_matches('.').chars().map(plain).collect();
     let default = [PathBuf::from(format!("{name}.exr"))];
     let outputs = if arguments.output.is_empty() { &default[..] } else { &arguments.output };
-    let absolute = |path: &Path| std::path::absolute(path).map_err(|e| Error::Usage(format!("{}: {e}", path.display())));
+    let absolute =
+        |path: &Path| std::path::absolute(path).map_err(|e| Error::Usage(format!("{}: {e}", path.display())));
     let output = |path: &PathBuf| {
         Format::from_path(path)?;
         let path = absolute(path)?;

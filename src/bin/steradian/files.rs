@@ -61,9 +61,12 @@ impl<'a> NamedFiles<'a> {
                 self.written.push((arguments.output.clone(), "the denoised picture"));
                 self.written.extend(arguments.also.iter().map(|path| (path.clone(), "--png")));
             }
-            Command::CheckExr(arguments) => self.read.extend(arguments.files.iter().map(|path| (path.as_path(), "a file to check"))),
+            Command::CheckExr(arguments) => {
+                self.read.extend(arguments.files.iter().map(|path| (path.as_path(), "a file to check")));
+            }
             Command::Compare(arguments) => {
-                self.read.extend([(arguments.reference.as_path(), "the reference"), (arguments.test.as_path(), "the test")]);
+                self.read
+                    .extend([(arguments.reference.as_path(), "the reference"), (arguments.test.as_path(), "the test")]);
             }
             Command::Farm(FarmCommand::Slurm(arguments)) => self.read.push((&arguments.job.scene, SCENE)),
             Command::Farm(FarmCommand::Openjd(arguments)) => self.read.push((&arguments.job.scene, SCENE)),
@@ -97,7 +100,9 @@ impl<'a> NamedFiles<'a> {
             BenchCommand::Reports(arguments) => (&arguments.out, "reports"),
             BenchCommand::ScaleCase => return,
         };
-        let files = folder.iter().flat_map(|folder| ["html", "md", "csv", "json"].map(|kind| folder.join(format!("{stem}.{kind}"))));
+        let files = folder
+            .iter()
+            .flat_map(|folder| ["html", "md", "csv", "json"].map(|kind| folder.join(format!("{stem}.{kind}"))));
         self.written.extend(files.map(|path| (path, "--out")));
     }
 }
@@ -114,7 +119,13 @@ pub fn of_command(cli: &Cli, mut uses: FileUses) -> Result<()> {
 
 /// Compares the files of a render, with those that the scene names; `outputs` and `shard` have names for all frames of
 /// a sequence.
-pub fn of_render(arguments: &RenderArgs, shot: &Shot, outputs: &[OutputDesc], shard: Option<&Path>, mut uses: FileUses) -> Result<()> {
+pub fn of_render(
+    arguments: &RenderArgs,
+    shot: &Shot,
+    outputs: &[OutputDesc],
+    shard: Option<&Path>,
+    mut uses: FileUses,
+) -> Result<()> {
     if shot.unchecked.is_empty() {
         return Ok(());
     }
@@ -123,9 +134,11 @@ pub fn of_render(arguments: &RenderArgs, shot: &Shot, outputs: &[OutputDesc], sh
     for frame in &shot.unchecked {
         let scene = frame.map_or_else(|| shot.scene.clone(), |frame| scene_of_frame(&arguments.scene, frame));
         uses.read(&scene, "the scene")?;
-        let numbered = |name: &str| frame.map_or_else(|| name.to_owned(), |frame| file_of_frame(&with_frame_pattern(name), frame));
+        let numbered =
+            |name: &str| frame.map_or_else(|| name.to_owned(), |frame| file_of_frame(&with_frame_pattern(name), frame));
         let state = [(shard, "--output"), (arguments.state.checkpoint.as_deref(), "--checkpoint")];
-        let state = state.into_iter().filter_map(|(path, purpose)| Some((numbered(&path?.to_string_lossy()).into(), purpose)));
+        let state =
+            state.into_iter().filter_map(|(path, purpose)| Some((numbered(&path?.to_string_lossy()).into(), purpose)));
         written.extend(state);
         if shard.is_none() {
             for output in outputs {
@@ -137,12 +150,14 @@ pub fn of_render(arguments: &RenderArgs, shot: &Shot, outputs: &[OutputDesc], sh
             }
         }
         // Those of frames without a number in the name follow each other in one file.
-        let statistics_of =
-            |path: &PathBuf| frame.map_or_else(|| path.clone(), |frame| file_of_frame(&path.to_string_lossy(), frame).into());
+        let statistics_of = |path: &PathBuf| {
+            frame.map_or_else(|| path.clone(), |frame| file_of_frame(&path.to_string_lossy(), frame).into())
+        };
         statistics.extend(arguments.json.iter().filter(|path| !is_stdout(path)).map(statistics_of));
     }
     written.extend(statistics.into_iter().map(|path| (path, "--json")));
-    written.extend(arguments.import.report.iter().filter(|path| !is_stdout(path)).map(|path| (path.clone(), "--report")));
+    written
+        .extend(arguments.import.report.iter().filter(|path| !is_stdout(path)).map(|path| (path.clone(), "--report")));
     written.iter().try_for_each(|(path, purpose)| uses.write(path, *purpose))?;
     // A file that the scene names is there: it can only be overwritten by one that is.
     if !written.iter().any(|(path, _)| path.exists()) {

@@ -100,7 +100,8 @@ pub fn run(arguments: &RenderArgs, uses: FileUses) -> Result<u8> {
     let result = match &arguments.sequence.frames {
         None => single(arguments, &session),
         Some(_) if arguments.live.preview_hold => Err(Error::Usage(
-            "--preview-hold: a sequence goes on with its next frame; leave out one of --frames and --preview-hold".to_owned(),
+            "--preview-hold: a sequence goes on with its next frame; leave out one of --frames and --preview-hold"
+                .to_owned(),
         )),
         Some(frames) => Sequence::new(arguments, &session).run(frames),
     };
@@ -116,7 +117,12 @@ fn single(arguments: &RenderArgs, session: &Session) -> Result<u8> {
     session.reporter.begin(None);
     let start = Instant::now();
     let imported = scene::load(&arguments.scene, &arguments.import, arguments.verbosity)?;
-    render::picture(arguments, Shot { scene: arguments.scene.clone(), imported, frame: None, unchecked: vec![None] }, session, start)
+    render::picture(
+        arguments,
+        Shot { scene: arguments.scene.clone(), imported, frame: None, unchecked: vec![None] },
+        session,
+        start,
+    )
 }
 
 /// A sequence under way.
@@ -138,8 +144,11 @@ impl<'a> Sequence<'a> {
         let reporter = &self.session.reporter;
         let (skipped, todo): (Vec<i64>, Vec<i64>) = frames.numbers().iter().partition(|frame| self.is_done(**frame));
         if !skipped.is_empty() {
-            let count =
-                if skipped.len() == 1 { "1 frame exists and is".to_owned() } else { format!("{} frames exist and are", skipped.len()) };
+            let count = if skipped.len() == 1 {
+                "1 frame exists and is".to_owned()
+            } else {
+                format!("{} frames exist and are", skipped.len())
+            };
             reporter.say(&format!("{count} skipped (--overwrite renders them again)"));
             let shares_files = !is_scene_per_frame(&self.arguments.scene) && !is_gltf(&self.arguments.scene);
             skipped::warn(self.arguments, &skipped, self.session, shares_files, |frame| self.shot_to_compare(frame));
@@ -150,7 +159,9 @@ impl<'a> Sequence<'a> {
         for frame in todo.iter().copied() {
             reporter.begin(Some(frame));
             let start = Instant::now();
-            let result = self.shot(frame, &mut unchecked).and_then(|shot| render::picture(self.arguments, shot, self.session, start));
+            let result = self
+                .shot(frame, &mut unchecked)
+                .and_then(|shot| render::picture(self.arguments, shot, self.session, start));
             match result {
                 Ok(0) => {}
                 Ok(code) => return Ok(code),
@@ -228,8 +239,11 @@ impl<'a> Sequence<'a> {
             let whole = self.whole.get().ok_or_else(|| Error::Internal("no scene".to_owned()))?;
             at_frame(whole, frame)
         };
-        let unchecked =
-            if is_scene_per_frame(&self.arguments.scene) && unchecked.is_empty() { vec![Some(frame)] } else { std::mem::take(unchecked) };
+        let unchecked = if is_scene_per_frame(&self.arguments.scene) && unchecked.is_empty() {
+            vec![Some(frame)]
+        } else {
+            std::mem::take(unchecked)
+        };
         Ok(Shot { scene, imported, frame: Some(frame), unchecked })
     }
 }

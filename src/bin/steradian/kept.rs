@@ -7,7 +7,8 @@ use steradian::film::Image;
 use steradian::import::{Imported, scene_fingerprint};
 use steradian::output::RenderInfo;
 use steradian::render::{
-    self, Checkpoints, Header, Overrides, Progress, RenderResult, RenderSession, RenderState, Settings, Shard, StateFile,
+    self, Checkpoints, Header, Overrides, Progress, RenderResult, RenderSession, RenderState, Settings, Shard,
+    StateFile,
 };
 use steradian::scene::Scene;
 use steradian::{Error, Result};
@@ -39,7 +40,10 @@ pub fn take_shard_name(arguments: &StateArgs, scene: &Path, overrides: &mut Over
             Ok(Some(format!("{stem}.{}-of-{}.{EXTENSION}", shard.index, shard.count).into()))
         }
         [name] if is_shard(name) => Ok(Some(name.into())),
-        _ => Err(Error::Usage(format!("-o {}: with --shard, one file whose name ends with .{EXTENSION}", names.join(" -o ")))),
+        _ => Err(Error::Usage(format!(
+            "-o {}: with --shard, one file whose name ends with .{EXTENSION}",
+            names.join(" -o ")
+        ))),
     }
 }
 
@@ -68,13 +72,26 @@ impl<'a> Resumable<'a> {
     }
 
     /// The header of checkpoints and shards of this render.
-    pub fn header(&self, imported: &Imported, file: &Path, scene: &Scene, settings: &Settings, info: RenderInfo) -> Result<Header> {
+    pub fn header(
+        &self,
+        imported: &Imported,
+        file: &Path,
+        scene: &Scene,
+        settings: &Settings,
+        info: RenderInfo,
+    ) -> Result<Header> {
         let fingerprint = scene_fingerprint(imported, file)?;
         Ok(Header { info, ..Header::new(&file.to_string_lossy(), fingerprint, scene, settings, self.shard) })
     }
 
     /// Renders from where the checkpoint is, and writes the shard.
-    pub fn render(mut self, session: &RenderSession, header: &Header, reporter: &Reporter, interrupt: &Interrupt) -> Result<RenderResult> {
+    pub fn render(
+        mut self,
+        session: &RenderSession,
+        header: &Header,
+        reporter: &Reporter,
+        interrupt: &Interrupt,
+    ) -> Result<RenderResult> {
         let RenderSession { scene, settings, .. } = *session;
         let state = match self.checkpoint.as_ref().filter(|_| self.arguments.resume) {
             Some(file) if file.path().exists() => {
@@ -88,10 +105,9 @@ impl<'a> Resumable<'a> {
             }
             None => RenderState::new(scene, settings, self.shard)?,
         };
-        let mut checkpoints = self
-            .checkpoint
-            .take()
-            .map(|file| Checkpoints::new(file, header.clone(), self.arguments.every, Arc::clone(&interrupt.checkpoint)));
+        let mut checkpoints = self.checkpoint.take().map(|file| {
+            Checkpoints::new(file, header.clone(), self.arguments.every, Arc::clone(&interrupt.checkpoint))
+        });
         let (state, stats) = session.render(state, checkpoints.as_mut())?;
         // What an interrupted shard has is in its checkpoint; a shard that is there is complete.
         let unfinished = stats.interrupted && checkpoints.is_some();

@@ -107,7 +107,9 @@ pub fn start(arguments: &LogArgs, verbosity: Verbosity, default_format: LogForma
 fn is_log(path: &Path) -> std::io::Result<bool> {
     let mut start = Vec::new();
     steradian::file::open(path)?.take(64).read_to_end(&mut start)?;
-    let separator = |i: usize| [(4, b'-'), (7, b'-'), (10, b'T'), (13, b':'), (16, b':')].into_iter().find(|(place, _)| *place == i);
+    let separator = |i: usize| {
+        [(4, b'-'), (7, b'-'), (10, b'T'), (13, b':'), (16, b':')].into_iter().find(|(place, _)| *place == i)
+    };
     let fits = |(i, byte): (usize, &u8)| separator(i).map_or(byte.is_ascii_digit(), |(_, expected)| *byte == expected);
     let is_dated = start.len() >= 19 && start.iter().take(19).enumerate().all(fits);
     Ok(start.is_empty() || is_dated || start.starts_with(br#"{"level":""#))
@@ -223,7 +225,11 @@ struct Text(String);
 
 impl Visit for Text {
     fn record_debug(&mut self, field: &Field, value: &dyn std::fmt::Debug) {
-        let _ = if field.name() == "message" { write!(self.0, "{value:?}") } else { write!(self.0, " {}={value:?}", field.name()) };
+        let _ = if field.name() == "message" {
+            write!(self.0, "{value:?}")
+        } else {
+            write!(self.0, " {}={value:?}", field.name())
+        };
     }
 }
 
@@ -233,13 +239,19 @@ mod tests {
 
     #[test]
     fn colours_follow_the_option_then_the_environment_then_the_terminal() {
-        let with =
-            |name: &'static str, value: &'static str| move |variable: &str| if variable == name { value.to_owned() } else { String::new() };
+        let with = |name: &'static str, value: &'static str| {
+            move |variable: &str| if variable == name { value.to_owned() } else { String::new() }
+        };
         let none = |_: &str| String::new();
         use ColorChoice::{Always, Auto, Never};
         assert!(decide_color(Auto, &none, true) && !decide_color(Auto, &none, false));
-        assert!(!decide_color(Auto, &with("NO_COLOR", "1"), true) && decide_color(Always, &with("NO_COLOR", "1"), false));
-        assert!(decide_color(Auto, &with("CLICOLOR_FORCE", "1"), false) && !decide_color(Auto, &with("CLICOLOR_FORCE", "0"), false));
+        assert!(
+            !decide_color(Auto, &with("NO_COLOR", "1"), true) && decide_color(Always, &with("NO_COLOR", "1"), false)
+        );
+        assert!(
+            decide_color(Auto, &with("CLICOLOR_FORCE", "1"), false)
+                && !decide_color(Auto, &with("CLICOLOR_FORCE", "0"), false)
+        );
         assert!(!decide_color(Auto, &with("TERM", "dumb"), true) && !decide_color(Never, &none, true));
         let both = |_: &str| "1".to_owned();
         assert!(!decide_color(Auto, &both, true));
@@ -250,7 +262,8 @@ mod tests {
         assert_eq!(rendered(LogFormat::Text, Level::Warning, "w", false, false), "warning: w");
         assert_eq!(rendered(LogFormat::Text, Level::Note, "n", true, false), "n");
         assert_eq!(rendered(LogFormat::Text, Level::Error, "e", true, false), "\x1b[1;31merror:\x1b[0m e");
-        let value: serde_json::Value = serde_json::from_str(&rendered(LogFormat::Json, Level::Info, "a \"b\"", true, true)).unwrap();
+        let value: serde_json::Value =
+            serde_json::from_str(&rendered(LogFormat::Json, Level::Info, "a \"b\"", true, true)).unwrap();
         assert_eq!((&value["level"], &value["message"]), (&"info".into(), &"a \"b\"".into()));
         let value: serde_json::Value =
             serde_json::from_str(&rendered(LogFormat::Json, Level::Info, "\u{9b}\nopenjd_env: a", true, true)).unwrap();

@@ -82,9 +82,9 @@ fn run(cli: Cli, uses: FileUses) -> Result<u8> {
         #[cfg(feature = "bench")]
         Command::Bench(command) => bench::run(&command),
         #[cfg(not(feature = "bench"))]
-        Command::Bench { .. } => {
-            Err(Error::Usage("this program was built without benchmarks; `cargo build --release` builds it with them".into()))
-        }
+        Command::Bench { .. } => Err(Error::Usage(
+            "this program was built without benchmarks; `cargo build --release` builds it with them".into(),
+        )),
         Command::Convert(arguments) => convert::run(&arguments, uses).map(|()| 0),
         Command::Farm(command) => farm::run(&command, uses).map(|()| 0),
         Command::Config(ConfigCommand::Show(arguments)) => config::show(&arguments).map(|()| 0),
@@ -154,7 +154,10 @@ fn report_panics() {
         memory::end_if_out_of_memory(message);
         let place = panic.location().map(ToString::to_string).unwrap_or_default();
         let version = env!("CARGO_PKG_VERSION");
-        let text = format!("internal error in steradian {version} at {place}: {message} (this is a bug; please report it with the scene)");
+        let text = format!(
+            "internal error in steradian {version} at {place}: {message} (this is a bug; please report it with the \
+             scene)"
+        );
         log::message(Level::Error, &text);
         std::process::exit(i32::from(INTERNAL));
     }));

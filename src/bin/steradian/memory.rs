@@ -93,7 +93,8 @@ pub fn handle_library_failures() {
 fn aborted() {
     const PROBE: usize = 1 << 20;
     // SAFETY: a new mapping at any place is in the way of no other.
-    match unsafe { mmap_anonymous(std::ptr::null_mut(), PROBE, ProtFlags::READ | ProtFlags::WRITE, MapFlags::PRIVATE) } {
+    match unsafe { mmap_anonymous(std::ptr::null_mut(), PROBE, ProtFlags::READ | ProtFlags::WRITE, MapFlags::PRIVATE) }
+    {
         Err(_) => end(OUT_OF_MEMORY, format_args!("out of memory in the C library")),
         Ok(probe) => {
             // SAFETY: the mapping made above, which nothing refers to.
@@ -109,7 +110,10 @@ extern "C" fn uncaught(out_of_memory: bool, what: *const c_char) {
     if out_of_memory {
         end(OUT_OF_MEMORY, format_args!("out of memory in Embree, or no more threads ({what})"));
     }
-    end(INTERNAL, format_args!("internal error in a C++ library: {what} (this is a bug; please report it with the scene)"));
+    end(
+        INTERNAL,
+        format_args!("internal error in a C++ library: {what} (this is a bug; please report it with the scene)"),
+    );
 }
 
 /// A line on the stack.

@@ -25,7 +25,11 @@ pub fn run(arguments: &MergeArgs, mut uses: FileUses) -> Result<()> {
     let image = Image { overscan: merged.state.film.shape().overscan, ..merged.state.film.resolve() };
     let (rays, nan_samples) = (merged.state.rays.total(), merged.state.film.dropped_count());
     let info = RenderInfo {
-        statistics: merged.header.info.statistics.map(|statistics| RenderStatistics { rays, nan_samples, ..statistics }),
+        statistics: merged.header.info.statistics.map(|statistics| RenderStatistics {
+            rays,
+            nan_samples,
+            ..statistics
+        }),
         samples_per_pixel: merged.state.done,
         render_seconds: merged.state.seconds,
         partial: merged.partial.clone(),
@@ -36,7 +40,10 @@ pub fn run(arguments: &MergeArgs, mut uses: FileUses) -> Result<()> {
     }
     let partial = merged.partial.map_or(String::new(), |partial| format!(" ({partial})"));
     let [width, height] = [image.crop.width, image.crop.height];
-    log::message(Level::Note, &format!("{width}x{height} pixels, {} samples per pixel{partial}", info.samples_per_pixel));
+    log::message(
+        Level::Note,
+        &format!("{width}x{height} pixels, {} samples per pixel{partial}", info.samples_per_pixel),
+    );
     outputs.iter().for_each(|output| log::message(Level::Note, &format!("wrote {}", output.file)));
     Ok(())
 }
@@ -50,7 +57,10 @@ fn outputs(header: &Header, names: &[String]) -> Result<Vec<OutputDesc>> {
     names.iter().try_for_each(|name| check_single_name(name))?;
     let like = |name: &String| -> Result<OutputDesc> {
         let format = Format::from_path(Path::new(name))?;
-        let known = header.outputs.iter().find(|output| Format::from_path(Path::new(&output.file)).is_ok_and(|other| other == format));
+        let known = header
+            .outputs
+            .iter()
+            .find(|output| Format::from_path(Path::new(&output.file)).is_ok_and(|other| other == format));
         Ok(OutputDesc { file: name.clone(), ..known.cloned().unwrap_or_else(|| OutputDesc::new(name.clone())) })
     };
     names.iter().map(like).collect()

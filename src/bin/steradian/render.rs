@@ -10,7 +10,8 @@ use steradian::film::LayerSet;
 use steradian::live::{Fan, Live};
 use steradian::output::{self, RenderInfo, RenderStatistics};
 use steradian::render::{
-    self, DEFAULT_EXTENSIONS, Header, Progress, RenderProvenance, RenderResult, RenderSession, Replayed, Settings, Stats,
+    self, DEFAULT_EXTENSIONS, Header, Progress, RenderProvenance, RenderResult, RenderSession, Replayed, Settings,
+    Stats,
 };
 use steradian::scene::Scene;
 use steradian::{Result, compile};
@@ -152,7 +153,8 @@ impl<'a> Plan<'a> {
 
     /// The header of the render's state, if it is kept.
     fn header(&self, shot: &Shot, scene: &Scene) -> Result<Option<Header>> {
-        let header = |kept: &Resumable| kept.header(&shot.imported, &shot.scene, scene, &self.settings, self.info(scene));
+        let header =
+            |kept: &Resumable| kept.header(&shot.imported, &shot.scene, scene, &self.settings, self.info(scene));
         self.kept.as_ref().map(header).transpose()
     }
 
@@ -177,7 +179,8 @@ impl<'a> Plan<'a> {
         let (reporter, interrupt) = (&session.reporter, session.interrupt()?);
         let fan = Fan::new([reporter as &dyn Progress, live]);
         if let (Some(kept), Some(header)) = (self.kept.take(), header) {
-            let session = RenderSession { scene, accel, settings: &self.settings, progress: &fan, stop: &interrupt.stop };
+            let session =
+                RenderSession { scene, accel, settings: &self.settings, progress: &fan, stop: &interrupt.stop };
             return kept.render(&session, header, reporter, interrupt);
         }
         let result = render::render(scene, accel, &self.settings, &fan, &interrupt.stop)?;
@@ -195,11 +198,19 @@ impl<'a> Plan<'a> {
         live: &Live,
     ) -> Result<()> {
         let accel = run.accel;
-        let denoised = denoise::finish(self.denoiser.as_ref().filter(|_| self.shard_file.is_none()), &mut image, &session.reporter);
+        let denoised = denoise::finish(
+            self.denoiser.as_ref().filter(|_| self.shard_file.is_none()),
+            &mut image,
+            &session.reporter,
+        );
         let info = RenderInfo {
             samples_per_pixel: stats.spp_done,
             render_seconds: stats.render_seconds,
-            statistics: Some(RenderStatistics { threads: self.settings.threads, rays: stats.rays.total(), nan_samples: stats.nan_samples }),
+            statistics: Some(RenderStatistics {
+                threads: self.settings.threads,
+                rays: stats.rays.total(),
+                nan_samples: stats.nan_samples,
+            }),
             settings: self.provenance.clone().map(|provenance| provenance.with_samples(stats.spp_done).to_value()),
             texts: denoised.texts,
             ..self.info(scene)
@@ -243,7 +254,11 @@ pub fn default_outputs(scene: &Path) -> Vec<String> {
 fn check_names(arguments: &RenderArgs, settings: &Settings) -> Result<()> {
     let state = [&arguments.state.checkpoint, &arguments.json].into_iter().flatten().filter_map(|path| path.to_str());
     let defaults = default_outputs(&arguments.scene);
-    let outputs = settings.outputs.iter().map(|output| output.file.as_str()).filter(|name| !defaults.iter().any(|other| other == name));
+    let outputs = settings
+        .outputs
+        .iter()
+        .map(|output| output.file.as_str())
+        .filter(|name| !defaults.iter().any(|other| other == name));
     state.chain(arguments.output.iter().map(String::as_str)).chain(outputs).try_for_each(check_single_name)
 }
 

@@ -33,7 +33,8 @@ pub fn run(arguments: &RerenderArgs, mut uses: FileUses) -> Result<u8> {
     let like = provenance.output.take().filter(|_| format == Format::Exr);
     provenance.output = Some(OutputDesc {
         file: name,
-        ..like.unwrap_or_else(|| OutputDesc { view: Some(provenance.settings.integrator.view()), ..OutputDesc::new("") })
+        ..like
+            .unwrap_or_else(|| OutputDesc { view: Some(provenance.settings.integrator.view()), ..OutputDesc::new("") })
     });
     provenance.settings.spp = arguments.spp.unwrap_or(provenance.settings.spp);
     if provenance.settings.spp == 0 {
@@ -75,7 +76,10 @@ fn scene_file(arguments: &RerenderArgs, provenance: &RenderProvenance) -> PathBu
 
 /// How the picture that is about to be rendered is made, if a file keeps it.
 pub fn provenance(arguments: &RenderArgs, shot: &Shot, settings: &Settings) -> Result<Option<RenderProvenance>> {
-    let keeps = settings.outputs.iter().any(|output| Format::from_path(Path::new(&output.file)).is_ok_and(|f| f == Format::Exr));
+    let keeps = settings
+        .outputs
+        .iter()
+        .any(|output| Format::from_path(Path::new(&output.file)).is_ok_and(|f| f == Format::Exr));
     if arguments.pixel.is_some() || (arguments.repeat.is_none() && !keeps) {
         return Ok(None);
     }
@@ -83,7 +87,10 @@ pub fn provenance(arguments: &RenderArgs, shot: &Shot, settings: &Settings) -> R
     if let Some(Repeat { provenance, file, allow_changed }) = arguments.repeat.as_deref() {
         let changed = provenance.scene.differences(&scene);
         if !changed.is_empty() && !allow_changed {
-            let message = format!("the picture shows another scene: not the same {} (--allow-changed goes on)", changed.join(", "));
+            let message = format!(
+                "the picture shows another scene: not the same {} (--allow-changed goes on)",
+                changed.join(", ")
+            );
             return Err(Error::Checkpoint { file: file.clone(), message });
         }
     }
@@ -91,7 +98,10 @@ pub fn provenance(arguments: &RenderArgs, shot: &Shot, settings: &Settings) -> R
     Ok(Some(RenderProvenance {
         import: arguments.import.options(),
         allow_missing: arguments.import.allow_missing,
-        frame: shot.frame.filter(|_| !is_scene_per_frame(&arguments.scene)).map(|number| SequenceFrame { number, per_second }),
+        frame: shot
+            .frame
+            .filter(|_| !is_scene_per_frame(&arguments.scene))
+            .map(|number| SequenceFrame { number, per_second }),
         denoise: arguments.denoise.denoise,
         ..RenderProvenance::new(&shot.scene, scene, settings, std::env::args().skip(1).collect())
     }))

@@ -56,7 +56,8 @@ fn lines(path: &Path, imported: &Imported, verbose: bool) -> Vec<String> {
     }
     let counts = [Outcome::Mapped, Outcome::Approximated, Outcome::Ignored].map(|outcome| report.count(outcome));
     let [mapped, approximated, ignored] = counts;
-    let head = format!("{}: {mapped} parameters mapped, {approximated} approximated, {ignored} ignored", path.display());
+    let head =
+        format!("{}: {mapped} parameters mapped, {approximated} approximated, {ignored} ignored", path.display());
     if verbose {
         return std::iter::once(head).chain(report.entries.iter().map(line)).collect();
     }

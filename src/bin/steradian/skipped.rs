@@ -25,7 +25,9 @@ impl Skipped {
     /// Compares the settings in the file of a frame with those that it would be rendered with.
     pub fn compare(&mut self, frame: i64, expected: Option<&RenderProvenance>, outputs: &[OutputDesc]) {
         let found = expected.and_then(|expected| {
-            let output = outputs.iter().find(|output| Format::from_path(Path::new(&output.file)).is_ok_and(|f| f == Format::Exr))?;
+            let output = outputs
+                .iter()
+                .find(|output| Format::from_path(Path::new(&output.file)).is_ok_and(|f| f == Format::Exr))?;
             let file = Path::new(&output.file);
             let found = RenderProvenance::from_value(output::read_settings(file).ok()?, file).ok()?;
             Some(found.of_frame(frame).differences(&expected.of_frame(frame), output))
@@ -44,11 +46,14 @@ impl Skipped {
             let numbers = FrameList::new(frames.clone()).map_or(String::new(), |list| list.ranges('x'));
             let what = differences.join(", ");
             session.reporter.warn(&format!(
-                "{noun} {numbers}: skipped, but rendered with other settings than the rest {verb}: {what} (--overwrite renders such frames again)"
+                "{noun} {numbers}: skipped, but rendered with other settings than the rest {verb}: {what} (--overwrite \
+                 renders such frames again)"
             ));
         }
         if !self.unknown.is_empty() && !self.changed.is_empty() {
-            session.reporter.say(&format!("the files of {} of the frames have no settings to compare", self.unknown.len()));
+            session
+                .reporter
+                .say(&format!("the files of {} of the frames have no settings to compare", self.unknown.len()));
         }
     }
 }
@@ -56,7 +61,13 @@ impl Skipped {
 /// Compares the frames of a sequence that are there with what they would be rendered as. `shot` gives a frame of the
 /// sequence; a scene that cannot be read leaves nothing to compare, for nothing is rendered from it. The files of a
 /// scene that are the same for all frames are read once.
-pub fn warn(arguments: &RenderArgs, frames: &[i64], session: &Session, shares_files: bool, shot: impl Fn(i64) -> Option<Shot>) {
+pub fn warn(
+    arguments: &RenderArgs,
+    frames: &[i64],
+    session: &Session,
+    shares_files: bool,
+    shot: impl Fn(i64) -> Option<Shot>,
+) {
     if arguments.state.shard.is_some() || arguments.repeat.is_some() {
         return;
     }

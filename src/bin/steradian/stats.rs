@@ -26,7 +26,8 @@ pub struct Run<'a> {
 pub fn value(run: &Run, settings: &Settings, stats: &Stats) -> Value {
     let accel = run.accel;
     let rays = stats.rays;
-    let millions_per_second = |count: u64| if stats.render_seconds > 0.0 { count as f64 / stats.render_seconds * 1e-6 } else { 0.0 };
+    let millions_per_second =
+        |count: u64| if stats.render_seconds > 0.0 { count as f64 / stats.render_seconds * 1e-6 } else { 0.0 };
     let description = accel.description();
     json!({
         "scene": run.scene.display().to_string(),
@@ -82,7 +83,10 @@ mod tests {
 
     #[test]
     fn the_description_of_embree_is_taken_apart() {
-        assert_eq!(embree("Embree 3.13.5 (AVX-512, single rays and packets of 16)"), json!({ "version": "3.13.5", "isa": "AVX-512" }));
+        assert_eq!(
+            embree("Embree 3.13.5 (AVX-512, single rays and packets of 16)"),
+            json!({ "version": "3.13.5", "isa": "AVX-512" })
+        );
         assert_eq!(embree("linear search"), Value::Null);
     }
 

@@ -15,7 +15,9 @@ pub fn print(text: &str) -> Result<()> {
 pub fn print_as_it_is(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
-        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Error::Output { file: "stdout".into(), message: e.to_string() }),
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => {
+            Err(Error::Output { file: "stdout".into(), message: e.to_string() })
+        }
         _ => Ok(()),
     }
 }

@@ -6,8 +6,9 @@ use super::super::microfacet::{Microfacets, reflect};
 use super::super::principled::shapes::{self, ClearCoat};
 use super::super::{Ggx, SMOOTH_ALPHA};
 use super::table::{
-    ALPHAS, ASPECTS, Block, CLEAR_COAT, COAT, COAT_AVERAGE, COAT_NODES, COSINES, DIFFUSE, GLASS, GLASS_AVERAGE, IORS, MAX_IOR, MIRRORS,
-    MIRRORS_AVERAGE, SCHLICK, SHAPES, SHEEN, TableCoordinate, across, cosine_axis, schlick_weight, smoothed,
+    ALPHAS, ASPECTS, Block, CLEAR_COAT, COAT, COAT_AVERAGE, COAT_NODES, COSINES, DIFFUSE, GLASS, GLASS_AVERAGE, IORS,
+    MAX_IOR, MIRRORS, MIRRORS_AVERAGE, SCHLICK, SHAPES, SHEEN, TableCoordinate, across, cosine_axis, schlick_weight,
+    smoothed,
 };
 use crate::math::{Vec3, sin_cos_turns, vec3};
 use crate::sampling::warp;
@@ -83,7 +84,8 @@ fn schlick(entry: usize) -> f32 {
     let [alpha, cos] = places(entry, [ALPHAS, COSINES]);
     let alpha = node_alpha(alpha);
     let cos = node_cosine(alpha, cos);
-    mean_of_facets([alpha; 2], direction(cos, 0.0), |f| f.shadowing * schlick_weight(f.cos)) - schlick_weight(smoothed(cos, alpha))
+    mean_of_facets([alpha; 2], direction(cos, 0.0), |f| f.shadowing * schlick_weight(f.cos))
+        - schlick_weight(smoothed(cos, alpha))
 }
 
 fn glass(entry: usize) -> f32 {
@@ -241,7 +243,9 @@ const STEPS: usize = 2048;
 
 /// Cosines and their weights under diffuse light, dense at grazing: 2 cos dcos with cos = t^4.
 fn cosines() -> impl Iterator<Item = (f32, f64)> {
-    (0..STEPS).map(|step| (step as f64 + 0.5) / STEPS as f64).map(|t| (t.powi(4) as f32, 8.0 * t.powi(7) / STEPS as f64))
+    (0..STEPS)
+        .map(|step| (step as f64 + 0.5) / STEPS as f64)
+        .map(|t| (t.powi(4) as f32, 8.0 * t.powi(7) / STEPS as f64))
 }
 
 /// The row of a table at a cosine.
@@ -289,7 +293,10 @@ mod tests {
                 let entry = (i * 7919 + 311 * number) % block.len();
                 let (fresh, old) = (value(source, entry, &before), committed[entry]);
                 let scale = if matches!(source, TableValue::BlockBefore(_)) { (fresh + old).min(1.0) } else { 1.0 };
-                assert!((fresh - old).abs() * scale <= 2.0 * block.step(), "block {number}, entry {entry}: {fresh} {old}");
+                assert!(
+                    (fresh - old).abs() * scale <= 2.0 * block.step(),
+                    "block {number}, entry {entry}: {fresh} {old}"
+                );
             }
             before = committed;
         }

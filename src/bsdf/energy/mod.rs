@@ -25,8 +25,8 @@ use super::{Ggx, Microfacets};
 use crate::math::Vec3;
 pub(super) use table::schlick_weight;
 use table::{
-    ALPHAS, ASPECTS, CLEAR_COAT, COAT, COAT_AVERAGE, COAT_NODES, COSINES, DIFFUSE, GLASS, GLASS_AVERAGE, IORS, MIRRORS, MIRRORS_AVERAGE,
-    SCHLICK, SHAPES, SHEEN, TableCoordinate, across, smoothed,
+    ALPHAS, ASPECTS, CLEAR_COAT, COAT, COAT_AVERAGE, COAT_NODES, COSINES, DIFFUSE, GLASS, GLASS_AVERAGE, IORS, MIRRORS,
+    MIRRORS_AVERAGE, SCHLICK, SHAPES, SHEEN, TableCoordinate, across, smoothed,
 };
 
 /// A smaller loss under diffuse light counts as none.
@@ -101,7 +101,8 @@ impl Energy {
         }
         let at = TableCoordinate::new(self.aspect.sqrt(), ASPECTS);
         let of = |axis: usize| {
-            let (before, after) = (self.mirrors(at.node, axis, coordinates.cosine), self.mirrors(at.node + 1, axis, coordinates.cosine));
+            let (before, after) =
+                (self.mirrors(at.node, axis, coordinates.cosine), self.mirrors(at.node + 1, axis, coordinates.cosine));
             before + (after - before) * at.part
         };
         let (along, across) = (of(0), of(1));
@@ -110,8 +111,9 @@ impl Energy {
 
     /// 1 minus the mean of [`Energy::directional_albedo`] under diffuse light.
     pub fn average_missing_energy(&self) -> f32 {
-        let missing =
-            MIRRORS_AVERAGE.bilinear_square(0, ALPHAS, TableCoordinate::new(self.aspect.sqrt(), ASPECTS), self.at_alpha).max(MIN_LOST);
+        let missing = MIRRORS_AVERAGE
+            .bilinear_square(0, ALPHAS, TableCoordinate::new(self.aspect.sqrt(), ASPECTS), self.at_alpha)
+            .max(MIN_LOST);
         // Between the axes of anisotropic microfacets the table is interpolated: rather a hundredth of the lobe too
         // dark than too bright.
         if self.aspect == 1.0 { missing } else { 1.01 * missing }
@@ -175,7 +177,8 @@ impl Energy {
 /// [`Energy::schlick`] of isotropic microfacets.
 #[inline(always)]
 fn isotropic_schlick(cos: f32, alpha: f32, at_alpha: TableCoordinate) -> f32 {
-    SCHLICK.bilinear_from(0, COSINES, at_alpha, TableCoordinate::of_cosine(cos, alpha)) + schlick_weight(smoothed(cos, alpha))
+    SCHLICK.bilinear_from(0, COSINES, at_alpha, TableCoordinate::of_cosine(cos, alpha))
+        + schlick_weight(smoothed(cos, alpha))
 }
 
 /// Colour of light that leaves after more than one reflection, over what perfect mirrors would leave for it, where
@@ -192,7 +195,11 @@ pub fn principled_diffuse(roughness: f32, subsurface: f32, cos: f32) -> f32 {
     let (shape, at) = (TableCoordinate::new(roughness, SHAPES), TableCoordinate::of_cosine(cos, 1.0));
     const KIND: usize = SHAPES * COSINES;
     let diffuse = DIFFUSE.bilinear_from(0, COSINES, shape, at);
-    if subsurface == 0.0 { diffuse } else { diffuse + (DIFFUSE.bilinear_from(KIND, COSINES, shape, at) - diffuse) * subsurface }
+    if subsurface == 0.0 {
+        diffuse
+    } else {
+        diffuse + (DIFFUSE.bilinear_from(KIND, COSINES, shape, at) - diffuse) * subsurface
+    }
 }
 
 /// Albedo of the principled model's sheen.
@@ -212,7 +219,8 @@ pub fn principled_clear_coat(gloss: f32, cos: f32) -> f32 {
 /// 10]`.
 #[inline]
 pub fn coat_albedo(ior: f32, alpha: f32, cos: f32) -> f32 {
-    let at = [TableCoordinate::of_alpha(alpha), TableCoordinate::of_ior(ior), TableCoordinate::new(cos.sqrt(), COAT_NODES)];
+    let at =
+        [TableCoordinate::of_alpha(alpha), TableCoordinate::of_ior(ior), TableCoordinate::new(cos.sqrt(), COAT_NODES)];
     COAT.trilinear(0, [IORS, COAT_NODES], at)
 }
 

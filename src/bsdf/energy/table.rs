@@ -82,7 +82,13 @@ impl Block {
 
     /// Square of the value between nodes of two axes, linear in the squares.
     #[inline]
-    pub fn bilinear_square(&self, start: usize, columns: usize, first: TableCoordinate, second: TableCoordinate) -> f32 {
+    pub fn bilinear_square(
+        &self,
+        start: usize,
+        columns: usize,
+        first: TableCoordinate,
+        second: TableCoordinate,
+    ) -> f32 {
         let square = |node: usize| self.at(node) * self.at(node);
         let row = |node: usize| {
             let at = start + node * columns + second.node;

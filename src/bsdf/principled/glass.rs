@@ -12,9 +12,15 @@ impl Principled {
     pub(super) fn eval_glass(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
         let glass = match self.p.model {
             PrincipledModel::Burley => self.glass().eval(wo, wi),
-            PrincipledModel::Mitsuba => Dielectric::with_facets(self.p.ior, self.ggx.alpha(), SeparableGgx::new).eval(wo, wi),
+            PrincipledModel::Mitsuba => {
+                Dielectric::with_facets(self.p.ior, self.ggx.alpha(), SeparableGgx::new).eval(wo, wi)
+            }
         };
-        if wo.z * wi.z > 0.0 { glass } else { BsdfEval { value: glass.value * self.p.base_color.map(f32::sqrt), ..glass } }
+        if wo.z * wi.z > 0.0 {
+            glass
+        } else {
+            BsdfEval { value: glass.value * self.p.base_color.map(f32::sqrt), ..glass }
+        }
     }
 
     #[inline]
@@ -45,7 +51,8 @@ impl Principled {
         }
         let facet = self.ggx.reflection(o, i);
         let reflectance = pane_reflectance(facet.cos, self.p.ior);
-        let (fraction, color) = if reflects { (reflectance, Rgb::WHITE) } else { (1.0 - reflectance, self.p.base_color) };
+        let (fraction, color) =
+            if reflects { (reflectance, Rgb::WHITE) } else { (1.0 - reflectance, self.p.base_color) };
         BsdfEval { value: color * (fraction * facet.value), pdf: fraction * facet.pdf }
     }
 

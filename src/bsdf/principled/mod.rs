@@ -160,7 +160,11 @@ impl Principled {
         LobeAlbedos {
             facets,
             schlick: energy.schlick(w).max(0.0).min(facets),
-            clearcoat: if self.p.clearcoat > 0.0 { self.p.clearcoat * principled_clear_coat(self.p.clearcoat_gloss, cos) } else { 0.0 },
+            clearcoat: if self.p.clearcoat > 0.0 {
+                self.p.clearcoat * principled_clear_coat(self.p.clearcoat_gloss, cos)
+            } else {
+                0.0
+            },
             sheen: if self.p.sheen > 0.0 { principled_sheen(cos) } else { 0.0 },
             diffuse: principled_diffuse(self.p.roughness, self.p.subsurface, cos),
         }
@@ -210,7 +214,8 @@ impl Principled {
         let specular = below * (f0 * (at.facets - at.schlick) + (self.p.metallic + self.dielectric()) * at.schlick);
         let left = (1.0 - self.layer_albedo(at).mean()).min(1.0);
         let base = self.dielectric() * left.min(self.p.base_color.mean());
-        let around = self.dielectric() * left * self.p.sheen * at.sheen + (1.0 - at.facets) * self.multiple.mean().min(1.0);
+        let around =
+            self.dielectric() * left * self.p.sheen * at.sheen + (1.0 - at.facets) * self.multiple.mean().min(1.0);
         let diffuse = below * (base * (1.0 - self.p.diffuse_transmission) + around);
         let diffuse_transmission = below * base * self.p.diffuse_transmission;
         let glass = below * self.glass;
@@ -283,7 +288,10 @@ impl Principled {
         }
         if self.p.clearcoat > 0.0 {
             let clear = |at: &LobeAlbedos| Rgb::splat(at.clearcoat);
-            let below = self.base_attenuation([clear(at_o), clear(&at_i)], [self.uncoated_albedo(at_o), self.uncoated_albedo(&at_i)]);
+            let below = self.base_attenuation(
+                [clear(at_o), clear(&at_i)],
+                [self.uncoated_albedo(at_o), self.uncoated_albedo(&at_i)],
+            );
             value = value * below + Rgb::splat(coat);
         }
         BsdfEval { value, pdf }

@@ -25,7 +25,8 @@ fn visible_normals_follow_their_density_and_cover_what_is_seen() {
             let pdf = |m: Vec3| {
                 if m.z > 0.0 { 4.0 * o.dot(m).max(0.0) * facets.reflection_pdf(o, m) } else { 0.0 }
             };
-            compare_directions(50_000, 4, |u| Some(facets.sample_visible_normal(o, [u[0], u[1]])), pdf).check(&format!("{alpha:?} {cos}"));
+            compare_directions(50_000, 4, |u| Some(facets.sample_visible_normal(o, [u[0], u[1]])), pdf)
+                .check(&format!("{alpha:?} {cos}"));
         }
     }
 }
@@ -40,7 +41,11 @@ fn masking_is_the_closed_form() {
             let erf = statrs::function::erf::erf(slope);
             let lambda = 0.5 * (erf - 1.0) + (-slope * slope).exp() / (2.0 * slope * std::f64::consts::PI.sqrt());
             let expected = 1.0 / (1.0 + lambda);
-            assert!((f64::from(facets.g1(w)) - expected).abs() < 2e-6 * expected, "{alpha:?} {w}: {} {expected}", facets.g1(w));
+            assert!(
+                (f64::from(facets.g1(w)) - expected).abs() < 2e-6 * expected,
+                "{alpha:?} {w}: {} {expected}",
+                facets.g1(w)
+            );
         }
     }
 }
@@ -87,7 +92,9 @@ fn no_white_furnace_gains_light_and_a_smooth_one_loses_none() {
 
 #[test]
 fn a_hardly_rough_surface_scatters_as_a_smooth_one_does() {
-    for (rough, smooth) in [(metal([SMOOTH_ALPHA; 2]), metal([0.0; 2])), (clear([3.0 * SMOOTH_ALPHA; 2]), clear([0.0; 2]))] {
+    for (rough, smooth) in
+        [(metal([SMOOTH_ALPHA; 2]), metal([0.0; 2])), (clear([3.0 * SMOOTH_ALPHA; 2]), clear([0.0; 2]))]
+    {
         assert!(smooth.flags().is_delta() && !rough.flags().is_delta());
         for u in random_points(2, 2_000) {
             let wo = direction(0.2 + 0.8 * u[0], u[1]);

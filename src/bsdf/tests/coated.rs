@@ -14,7 +14,8 @@ fn principled(parameters: PrincipledParameters) -> Bsdf {
 
 /// Opaque bases of every kind, white or coloured, with a name; the last two are smooth.
 fn bases(color: Rgb) -> Vec<(&'static str, Bsdf)> {
-    let coat = PrincipledParameters { base_color: color, clearcoat: 1.0, sheen: 0.5, ..PrincipledParameters::default() };
+    let coat =
+        PrincipledParameters { base_color: color, clearcoat: 1.0, sheen: 0.5, ..PrincipledParameters::default() };
     vec![
         ("lambert", Bsdf::Lambert(Lambert { albedo: color })),
         ("eon", Bsdf::Eon(Eon { albedo: color, roughness: 0.8 })),
@@ -95,7 +96,10 @@ fn a_coat_of_matching_index_leaves_the_base_alone() {
                 let (wo, wi) = (direction(0.1 + 0.9 * u[0], u[1]), direction(0.1 + 0.9 * u[2], u[3]));
                 let kept = if tint == Rgb::WHITE { 1.0 } else { 0.5f32.powf(0.5 / wo.z + 0.5 / wi.z) };
                 let (x, y) = (bsdf.eval(wo, wi).value, base.eval(wo, wi).value * kept);
-                assert!((x - y).max_channel().abs() <= 1e-4 * y.max_channel().max(1e-6), "{name} {alpha:?}: {x:?} {y:?}");
+                assert!(
+                    (x - y).max_channel().abs() <= 1e-4 * y.max_channel().max(1e-6),
+                    "{name} {alpha:?}: {x:?} {y:?}"
+                );
             }
         }
     }
@@ -138,7 +142,10 @@ fn two_smooth_layers_are_deltas_and_ends_of_ranges_are_finite() {
                             "{name} {ior} {alpha:?} {cos} {s:?}"
                         );
                         let eval = bsdf.eval(wo, direction(u[3] * u[3] * cos, u[0]));
-                        assert!(eval.value.is_finite() && eval.pdf.is_finite(), "{name} {ior} {alpha:?} {cos} {eval:?}");
+                        assert!(
+                            eval.value.is_finite() && eval.pdf.is_finite(),
+                            "{name} {ior} {alpha:?} {cos} {eval:?}"
+                        );
                     }
                 }
             }

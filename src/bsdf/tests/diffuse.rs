@@ -62,8 +62,16 @@ fn directions_follow_the_density_and_weights_are_value_over_density() {
                 let Some(s) = bsdf.sample(wo, u[2], [u[0], u[1]]) else { continue };
                 let eval = bsdf.eval(wo, s.wi);
                 // Never the albedo in place of value over density, never negative.
-                assert!((eval.value.g - s.weight.g * s.pdf).abs() <= 1e-5 * eval.value.g && eval.value.g >= 0.0, "{name} {s:?} {eval:?}");
-                assert!((eval.pdf - s.pdf).abs() <= 1e-5 * s.pdf && s.is_transmission == (s.wi.z * wo.z < 0.0) && s.eta == 1.0, "{name}");
+                assert!(
+                    (eval.value.g - s.weight.g * s.pdf).abs() <= 1e-5 * eval.value.g && eval.value.g >= 0.0,
+                    "{name} {s:?} {eval:?}"
+                );
+                assert!(
+                    (eval.pdf - s.pdf).abs() <= 1e-5 * s.pdf
+                        && s.is_transmission == (s.wi.z * wo.z < 0.0)
+                        && s.eta == 1.0,
+                    "{name}"
+                );
             }
         }
     }
@@ -136,7 +144,10 @@ fn phongs_lobe_is_finite_at_the_ends_of_its_ranges() {
             for (x, y) in [(0.0, 0.0), (0.0, last), (last, 0.0), (last, last), (0.5, 0.5)] {
                 for lobe in [0.0, last] {
                     let Some(s) = bsdf.sample(wo, lobe, [x, y]) else { continue };
-                    assert!(s.wi.is_finite() && s.weight.is_finite() && s.pdf > 0.0 && s.pdf.is_finite(), "{bsdf:?} {wo} {s:?}");
+                    assert!(
+                        s.wi.is_finite() && s.weight.is_finite() && s.pdf > 0.0 && s.pdf.is_finite(),
+                        "{bsdf:?} {wo} {s:?}"
+                    );
                 }
                 let eval = bsdf.eval(wo, direction(cos * x, y));
                 assert!(eval.value.is_finite() && eval.pdf.is_finite() && eval.pdf >= 0.0, "{bsdf:?} {wo} {eval:?}");
@@ -179,7 +190,10 @@ fn a_diffuser_shares_light_out_to_both_sides() {
         let s = leaf().sample(wo, u[2], [u[0], u[1]]).unwrap();
         *(if s.is_transmission { &mut other } else { &mut same }) += s.weight / 50_000.0;
     }
-    assert!((same.g - 0.5).abs() < 0.01 && (other.g - 0.5).abs() < 0.01 && (other.r - 0.6).abs() < 0.02, "{same:?} {other:?}");
+    assert!(
+        (same.g - 0.5).abs() < 0.01 && (other.g - 0.5).abs() < 0.01 && (other.r - 0.6).abs() < 0.02,
+        "{same:?} {other:?}"
+    );
     // More than all is scaled down.
     assert_eq!(DiffuseTransmission::new(Rgb::WHITE, Rgb::WHITE).albedo(wo), Rgb::WHITE);
 }

@@ -30,7 +30,8 @@ pub(super) const COSINES: [f32; 7] = [1.0, 0.8, 0.5, 0.25, 0.1, 0.05, 0.01];
 #[test]
 fn several_reflections_deepen_a_metals_colour() {
     let (Bsdf::Conductor(metal), wo) = (gold([1.0; 2]), direction(0.5, 0.0)) else { unreachable!() };
-    let (all, once) = (scattered(&Bsdf::Conductor(metal), wo), scattered(&Bsdf::Conductor(metal.single_scattering()), wo));
+    let (all, once) =
+        (scattered(&Bsdf::Conductor(metal), wo), scattered(&Bsdf::Conductor(metal.single_scattering()), wo));
     let added = all - once;
     assert!(added.r > 0.3 && added.b / added.r < 0.8 * once.b / once.r, "{all:?} {once:?}");
 }

@@ -13,13 +13,14 @@ fn everything_is_finite_at_every_angle_and_alpha() {
     let cosines = [1.0f32, 0.5, 1e-2, 1e-3, 1e-6, 1e-12, 1e-30, 1e-38, 1e-45, 0.0];
     for alpha in alphas {
         let mut all = vec![gold(alpha), perfect_metal(alpha), blue_plastic(alpha)];
-        all.extend([1.5, 1.0, 1.000_1, 1.001, 0.1, 10.0, 1.0 / 1.5].map(|ior| Bsdf::Dielectric(Dielectric::new(ior, alpha))));
+        all.extend(
+            [1.5, 1.0, 1.000_1, 1.001, 0.1, 10.0, 1.0 / 1.5].map(|ior| Bsdf::Dielectric(Dielectric::new(ior, alpha))),
+        );
         all.push(Bsdf::Plastic(Plastic::new(Rgb::BLACK, 1.0, alpha)));
         all.push(beckmann_gold(alpha));
-        all.extend(
-            [1.5, 1.0, 1.001, 0.1, 10.0]
-                .map(|ior| Bsdf::Beckmann(SingleScatteringBsdf::Dielectric(Dielectric::with_facets(ior, alpha, Beckmann::new)))),
-        );
+        all.extend([1.5, 1.0, 1.001, 0.1, 10.0].map(|ior| {
+            Bsdf::Beckmann(SingleScatteringBsdf::Dielectric(Dielectric::with_facets(ior, alpha, Beckmann::new)))
+        }));
         for bsdf in all {
             for cos in cosines.iter().flat_map(|&cos| [cos, -cos]) {
                 let wo = direction(cos, 0.2);
@@ -53,7 +54,9 @@ fn everything_is_finite_at_every_angle_and_alpha() {
 #[test]
 fn lobes_below_the_limit_are_deltas() {
     let below = [0.99 * SMOOTH_ALPHA; 2];
-    assert!(gold(below).flags().is_delta() && glass(below).flags().is_delta() && !white_plastic(below).flags().is_delta());
+    assert!(
+        gold(below).flags().is_delta() && glass(below).flags().is_delta() && !white_plastic(below).flags().is_delta()
+    );
     assert!(!gold([SMOOTH_ALPHA; 2]).flags().is_delta());
     // One rough axis makes the surface rough.
     assert!(!gold([0.0, 0.1]).flags().is_delta());
@@ -80,7 +83,9 @@ fn smooth_glass_refracts_by_its_side_and_reflects_totally() {
     assert!((s.weight.r - 1.0 / 2.25).abs() < 1e-6);
     // And back on the same path.
     let back = bsdf.sample(s.wi, 0.999, [0.5; 2]).unwrap();
-    assert!((back.wi - wo).length() < 1e-6 && (back.weight.r - 2.25).abs() < 1e-5 && (back.eta * 1.5 - 1.0).abs() < 1e-6);
+    assert!(
+        (back.wi - wo).length() < 1e-6 && (back.weight.r - 2.25).abs() < 1e-5 && (back.eta * 1.5 - 1.0).abs() < 1e-6
+    );
     // Inside beyond the critical angle nothing leaves and nothing is lost.
     let s = bsdf.sample(direction(-0.6, 0.0), 0.999_999, [0.5; 2]).unwrap();
     assert!(!s.is_transmission && s.weight == Rgb::WHITE && s.pdf == 1.0 && s.wi.z == -0.6);

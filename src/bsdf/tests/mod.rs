@@ -62,7 +62,12 @@ fn separable_glass(alpha: [f32; 2]) -> Bsdf {
 /// Plastic below a coat that loses light.
 fn lossy_plastic<D: Microfacets>(facets: D, nonlinear: bool) -> SingleScatteringBsdf<D> {
     let coat = Coat::single_scattering(1.5, facets, diffuse_mean);
-    SingleScatteringBsdf::Plastic(Plastic { diffuse: Rgb::new(0.1, 0.2, 0.7), coat, tint: Rgb::new(1.0, 0.5, 0.9), nonlinear })
+    SingleScatteringBsdf::Plastic(Plastic {
+        diffuse: Rgb::new(0.1, 0.2, 0.7),
+        coat,
+        tint: Rgb::new(1.0, 0.5, 0.9),
+        nonlinear,
+    })
 }
 
 fn white_plastic(alpha: [f32; 2]) -> Bsdf {

@@ -43,7 +43,8 @@ fn no_corner_scatters_more_than_it_receives() {
         // Only glass has another inside.
         let inside = (bits >> 9 & 1 == 1).then_some(-0.5);
         for cos in [1.0, 0.7, 0.3, 0.1, 0.02].into_iter().chain(inside) {
-            let by = |count: u32| [1, 2].map(|seed| scattered_by(count, seed, &bsdf, direction(cos, 0.07)).max_channel());
+            let by =
+                |count: u32| [1, 2].map(|seed| scattered_by(count, seed, &bsdf, direction(cos, 0.07)).max_channel());
             let [mut a, mut b] = by(4096);
             // Where the two leave it open, the narrow lobe of a coat at grazing angles for the most part, many more
             // points tell.
@@ -66,7 +67,9 @@ fn no_corner_reflects_more_than_it_receives_by_quadrature() {
     for bits in (0..512).filter(|bits| bits & 0b10 != 0) {
         let bsdf = Bsdf::Principled(Principled::new(&PrincipledParameters::white_corner(bits & !0b1000_0000)));
         let turns: &[f32] = if bits & 0b100 == 0 { &[0.07] } else { &[0.07, 0.2, 0.25] };
-        for (cos, turns) in [0.999, 0.6, 0.2, 0.05].into_iter().flat_map(|cos| turns.iter().map(move |&turns| (cos, turns))) {
+        for (cos, turns) in
+            [0.999, 0.6, 0.2, 0.05].into_iter().flat_map(|cos| turns.iter().map(move |&turns| (cos, turns)))
+        {
             let wo = direction(cos, turns);
             let mut sum = 0.0;
             for row in 0..rows {
@@ -88,9 +91,16 @@ fn no_corner_reflects_more_than_it_receives_by_quadrature() {
 #[test]
 fn thin_sheets_of_mitsuba_are_sampled_as_they_are_evaluated() {
     for (ior, anisotropic, specular_tint) in [(1.5, 0.0, 0.0), (1.5, 0.8, 0.7), (1.2, 0.0, 1.0), (2.5, 0.5, 0.0)] {
-        let glass =
-            PrincipledParameters { ior, anisotropic, specular_tint, transmission: 1.0, thin: true, ..PrincipledParameters::default() };
-        let parameters = PrincipledParameters { base_color: Rgb::new(0.9, 0.5, 0.25), model: PrincipledModel::Mitsuba, ..glass };
+        let glass = PrincipledParameters {
+            ior,
+            anisotropic,
+            specular_tint,
+            transmission: 1.0,
+            thin: true,
+            ..PrincipledParameters::default()
+        };
+        let parameters =
+            PrincipledParameters { base_color: Rgb::new(0.9, 0.5, 0.25), model: PrincipledModel::Mitsuba, ..glass };
         let bsdf = Bsdf::Principled(Principled::new(&parameters));
         let disagreement = sampling::worst_disagreement(&bsdf, &[1.0, 0.7, 0.3, 0.05, -0.5]);
         assert!(disagreement < 2e-4, "{ior} {anisotropic}: {disagreement}");
@@ -120,13 +130,19 @@ fn thin_sheets_of_mitsuba_are_sampled_as_they_are_evaluated() {
 #[test]
 fn a_white_metal_loses_nothing_and_black_keeps_only_its_layers() {
     for roughness in [0.0, 0.3, 0.7, 1.0] {
-        let metal = PrincipledParameters { base_color: Rgb::WHITE, metallic: 1.0, roughness, ..PrincipledParameters::default() };
+        let metal = PrincipledParameters {
+            base_color: Rgb::WHITE,
+            metallic: 1.0,
+            roughness,
+            ..PrincipledParameters::default()
+        };
         let black = PrincipledParameters { base_color: Rgb::BLACK, roughness, ..PrincipledParameters::default() };
         for cos in [1.0, 0.5, 0.1] {
             let wo = direction(cos, 0.2);
             let mean = |parameters: &PrincipledParameters| {
                 let bsdf = Principled::new(parameters);
-                let samples = random_points(3, 20_000).map(|u| bsdf.sample(wo, u[2], [u[0], u[1]]).map_or(0.0, |s| s.weight.g));
+                let samples =
+                    random_points(3, 20_000).map(|u| bsdf.sample(wo, u[2], [u[0], u[1]]).map_or(0.0, |s| s.weight.g));
                 samples.sum::<f32>() / 20_000.0
             };
             assert!((mean(&metal) - 1.0).abs() < 0.01, "{roughness} {cos}: {}", mean(&metal));
@@ -142,12 +158,20 @@ fn a_white_metal_loses_nothing_and_black_keeps_only_its_layers() {
 fn masking_and_distribution_share_their_alpha() {
     // With G from another alpha than D, normals visible from a direction would not add up to it: the white furnace of
     // single scattering at the limit of weak roughness keeps all, at any direction.
-    let metal = PrincipledParameters { base_color: Rgb::WHITE, metallic: 1.0, roughness: 0.1, multiscatter: false, ..Default::default() };
+    let metal = PrincipledParameters {
+        base_color: Rgb::WHITE,
+        metallic: 1.0,
+        roughness: 0.1,
+        multiscatter: false,
+        ..Default::default()
+    };
     let bsdf = Principled::new(&metal);
     for cos in [1.0, 0.5, 0.2] {
         let wo = direction(cos, 0.0);
-        let mean =
-            random_points(4, 10_000).map(|u| bsdf.sample(wo, u[2], [u[0], u[1]]).map_or(0.0, |s| s.weight.g)).sum::<f32>() / 10_000.0;
+        let mean = random_points(4, 10_000)
+            .map(|u| bsdf.sample(wo, u[2], [u[0], u[1]]).map_or(0.0, |s| s.weight.g))
+            .sum::<f32>()
+            / 10_000.0;
         assert!((mean - 1.0).abs() < 0.005, "{cos}: {mean}");
     }
 }

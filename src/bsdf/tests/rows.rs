@@ -11,7 +11,14 @@ fn bsdfs() -> Vec<Bsdf> {
         other => other,
     };
     let rough = ALPHAS.into_iter().flat_map(|alpha| {
-        let made = [gold(alpha), glass(alpha), separable_gold(alpha), separable_glass(alpha), beckmann_gold(alpha), beckmann_glass(alpha)];
+        let made = [
+            gold(alpha),
+            glass(alpha),
+            separable_gold(alpha),
+            separable_glass(alpha),
+            beckmann_gold(alpha),
+            beckmann_glass(alpha),
+        ];
         made.into_iter().chain([single(gold(alpha)), single(glass(alpha))])
     });
     rough.chain([gold([0.0; 2]), glass([0.0; 2])]).chain(plastics()).chain(principled()).collect()
@@ -28,16 +35,22 @@ fn principled() -> impl Iterator<Item = Bsdf> {
     };
     let models = [(PrincipledModel::Burley, true), (PrincipledModel::Burley, false), (PrincipledModel::Mitsuba, false)];
     let basic = models.into_iter().flat_map(move |(model, multiscatter)| {
-        [(0.0, 0.0), (0.0, 0.5), (0.3, 0.2), (1.0, 1.0)].map(|(metallic, roughness)| with(metallic, roughness, model, multiscatter))
+        [(0.0, 0.0), (0.0, 0.5), (0.3, 0.2), (1.0, 1.0)]
+            .map(|(metallic, roughness)| with(metallic, roughness, model, multiscatter))
     });
     let coated = PrincipledParameters { clearcoat: 0.7, sheen: 0.2, ..with(0.2, 0.4, PrincipledModel::Burley, true) };
     basic.chain([coated]).map(|parameters| Bsdf::Principled(Principled::new(&parameters)))
 }
 
 fn plastics() -> impl Iterator<Item = Bsdf> {
-    let coated =
-        |alpha, nonlinear| Plastic { nonlinear, tint: Rgb::new(0.9, 0.5, 1.0), ..Plastic::new(Rgb::new(0.2, 0.5, 0.9), 1.5, alpha) };
-    let ggx = [[0.0; 2], [0.1; 2], [0.7; 2], [0.1, 0.5]].into_iter().flat_map(move |alpha| [coated(alpha, false), coated(alpha, true)]);
+    let coated = |alpha, nonlinear| Plastic {
+        nonlinear,
+        tint: Rgb::new(0.9, 0.5, 1.0),
+        ..Plastic::new(Rgb::new(0.2, 0.5, 0.9), 1.5, alpha)
+    };
+    let ggx = [[0.0; 2], [0.1; 2], [0.7; 2], [0.1, 0.5]]
+        .into_iter()
+        .flat_map(move |alpha| [coated(alpha, false), coated(alpha, true)]);
     let separable = [0.0, 0.2].map(|alpha| lossy_plastic(SeparableGgx::new([alpha; 2]), true)).map(Bsdf::SeparableGgx);
     ggx.map(Bsdf::Plastic).chain(separable)
 }
@@ -72,16 +85,20 @@ fn recolored(bsdf: &Bsdf, random: &mut Rng) -> Bsdf {
 fn queries_in_rows_have_the_bits_of_single_ones() {
     let varying: Vec<Bsdf> = bsdfs().into_iter().filter(Bsdf::can_vary).collect();
     assert!(varying.len() >= 18);
-    for (bsdf, varies) in bsdfs().into_iter().map(|bsdf| (bsdf, false)).chain(varying.into_iter().map(|bsdf| (bsdf, true))) {
+    for (bsdf, varies) in
+        bsdfs().into_iter().map(|bsdf| (bsdf, false)).chain(varying.into_iter().map(|bsdf| (bsdf, true)))
+    {
         check_rows(&bsdf, varies);
     }
 }
 
 fn check_rows(first: &Bsdf, varies: bool) {
     let mut random = Rng::new(31);
-    let (mut queries, mut evals, mut samples) = (BsdfQueryRows::default(), BsdfEvalRows::default(), BsdfSampleRows::default());
+    let (mut queries, mut evals, mut samples) =
+        (BsdfQueryRows::default(), BsdfEvalRows::default(), BsdfSampleRows::default());
     for count in [1, 15, 16, 100, BATCH] {
-        let bsdfs: Vec<Bsdf> = (0..count).map(|i| if varies && i > 0 { recolored(first, &mut random) } else { first.clone() }).collect();
+        let bsdfs: Vec<Bsdf> =
+            (0..count).map(|i| if varies && i > 0 { recolored(first, &mut random) } else { first.clone() }).collect();
         for (i, bsdf) in bsdfs.iter().enumerate() {
             // Some in the surface, where nothing is scattered.
             let mut direction = || if random.below(20) == 0 { Vec3::X } else { random.direction().as_vec3() };

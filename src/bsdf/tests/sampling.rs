@@ -45,7 +45,10 @@ fn nothing_crosses_an_opaque_surface_and_all_that_crosses_says_so() {
         let opaque = !bsdf.flags().transmits();
         for u in random_points(8, 2_000) {
             for wo in [direction(u[0].max(0.01), u[1]), direction(-u[0].max(0.01), u[1])] {
-                assert!(!opaque || bsdf.eval(wo, direction(-u[2] * wo.z.signum(), u[3])) == BsdfEval::default(), "{name}");
+                assert!(
+                    !opaque || bsdf.eval(wo, direction(-u[2] * wo.z.signum(), u[3])) == BsdfEval::default(),
+                    "{name}"
+                );
                 if let Some(s) = bsdf.sample(wo, u[2], [u[3], u[0]]) {
                     assert_eq!(s.is_transmission, s.wi.z * wo.z < 0.0, "{name}");
                     assert!(!(opaque && s.is_transmission), "{name}");

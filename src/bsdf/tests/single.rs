@@ -49,7 +49,8 @@ fn a_nonlinear_base_deepens_and_a_white_one_loses_nothing() {
         assert_eq!(white.eval(o, i), linear.eval(o, i));
     }
     // r (1 - R) / (1 - r R) with R = 0.5963.
-    let ratio = plastic(0.5, 0.0).eval(Vec3::Z, Vec3::Z).value.g / Plastic::new(Rgb::WHITE, 1.5, [0.0; 2]).eval(Vec3::Z, Vec3::Z).value.g;
+    let ratio = plastic(0.5, 0.0).eval(Vec3::Z, Vec3::Z).value.g
+        / Plastic::new(Rgb::WHITE, 1.5, [0.0; 2]).eval(Vec3::Z, Vec3::Z).value.g;
     assert!((ratio - 0.2876).abs() < 1e-3, "{ratio}");
 }
 
@@ -62,7 +63,9 @@ fn tints_colour_what_is_reflected_and_what_crosses() {
         let clear = Dielectric::new(1.5, alpha);
         let tinted = clear.tinted(reflection, transmission);
         for u_lobe in [0.0, 0.02, 0.5, 0.9] {
-            let (Some(a), Some(b)) = (clear.sample(wo, u_lobe, [0.4; 2]), tinted.sample(wo, u_lobe, [0.4; 2])) else { continue };
+            let (Some(a), Some(b)) = (clear.sample(wo, u_lobe, [0.4; 2]), tinted.sample(wo, u_lobe, [0.4; 2])) else {
+                continue;
+            };
             let tint = if a.is_transmission { transmission } else { reflection };
             assert_eq!((a.wi, a.pdf, a.weight * tint), (b.wi, b.pdf, b.weight));
             assert_eq!(clear.eval(wo, a.wi).value * tint, tinted.eval(wo, a.wi).value);

@@ -21,7 +21,10 @@ fn assert_split(name: &str, whole: &Bsdf, specular: &Bsdf) {
         let (share, rest) = (whole.diffuse_fraction(wo, wi), specular.eval(wo, wi).value);
         for (share, (all, rest)) in share.to_array().into_iter().zip(all.to_array().into_iter().zip(rest.to_array())) {
             assert!((0.0..=1.0).contains(&share), "{name}: {share}");
-            assert!((share * all - (all - rest)).abs() <= 1e-5 * all, "{name} {wo} {wi}: {share} of {all}, without {rest}");
+            assert!(
+                (share * all - (all - rest)).abs() <= 1e-5 * all,
+                "{name} {wo} {wi}: {share} of {all}, without {rest}"
+            );
         }
     }
 }
@@ -40,7 +43,8 @@ fn shares_are_what_the_diffuse_part_adds() {
             Bsdf::Coated(Coated::new(Coat::new(1.4, [alpha; 2]), tint, base).into())
         };
         assert_split("coated", &coated(COLOR, COLOR), &coated(Rgb::BLACK, COLOR));
-        let twice = |diffuse: Rgb| Bsdf::Coated(Coated::new(Coat::new(1.4, [0.3; 2]), Rgb::WHITE, plastic(diffuse)).into());
+        let twice =
+            |diffuse: Rgb| Bsdf::Coated(Coated::new(Coat::new(1.4, [0.3; 2]), Rgb::WHITE, plastic(diffuse)).into());
         assert_split("coated plastic", &twice(COLOR), &twice(Rgb::BLACK));
     }
     for roughness in [0.2, 0.7] {
@@ -51,7 +55,8 @@ fn shares_are_what_the_diffuse_part_adds() {
             Bsdf::Principled(Principled::new(&PrincipledParameters { clearcoat, sheen, transmission, ..*p }))
         };
         for [clearcoat, sheen, transmission] in [[0.0; 3], [0.2, 0.0, 0.0], [0.2, 0.1, 0.0], [0.0, 0.1, 0.4]] {
-            let [whole, specular] = [(&dim, sheen), (&black, 0.0)].map(|(p, sheen)| with(p, clearcoat, sheen, transmission));
+            let [whole, specular] =
+                [(&dim, sheen), (&black, 0.0)].map(|(p, sheen)| with(p, clearcoat, sheen, transmission));
             assert_split("principled", &whole, &specular);
         }
     }
@@ -60,14 +65,22 @@ fn shares_are_what_the_diffuse_part_adds() {
 #[test]
 fn lobes_of_one_kind_are_all_or_nothing() {
     let principled = |metallic: f32, transmission: f32| {
-        let p = PrincipledParameters { base_color: COLOR, clearcoat: 0.5, metallic, transmission, ..PrincipledParameters::default() };
+        let p = PrincipledParameters {
+            base_color: COLOR,
+            clearcoat: 0.5,
+            metallic,
+            transmission,
+            ..PrincipledParameters::default()
+        };
         Bsdf::Principled(Principled::new(&p))
     };
     let over = |base: Bsdf, alpha: f32| Bsdf::Coated(Coated::new(Coat::new(1.5, [alpha; 2]), Rgb::WHITE, base).into());
     let lambert = || Bsdf::Lambert(Lambert { albedo: COLOR });
-    let specular = [gold([0.2; 2]), glass([0.3; 2]), beckmann_gold([0.2; 2]), beckmann_glass([0.2; 2]), principled(1.0, 0.0)];
+    let specular =
+        [gold([0.2; 2]), glass([0.3; 2]), beckmann_gold([0.2; 2]), beckmann_glass([0.2; 2]), principled(1.0, 0.0)];
     let more = [principled(0.0, 1.0), over(gold([0.4; 2]), 0.2), over(gold([0.4; 2]), 0.0)];
-    let diffuse = [lambert(), Bsdf::Eon(Eon { albedo: COLOR, roughness: 1.0 }), white_plastic([0.0; 2]), over(lambert(), 0.0)];
+    let diffuse =
+        [lambert(), Bsdf::Eon(Eon { albedo: COLOR, roughness: 1.0 }), white_plastic([0.0; 2]), over(lambert(), 0.0)];
     let sheet = [Bsdf::DiffuseTransmission(DiffuseTransmission::new(COLOR, COLOR))];
     for (wo, wi) in pairs() {
         assert!(specular.iter().chain(&more).all(|bsdf| bsdf.diffuse_fraction(wo, wi).is_black()));

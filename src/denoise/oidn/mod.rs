@@ -72,7 +72,10 @@ impl Device {
         // SAFETY: a call without preconditions.
         let handle = NonNull::new(unsafe { (functions.new_device)(sys::DEVICE_TYPE_CPU) });
         let handle = handle.ok_or_else(|| {
-            Unusable(last_error(&functions, std::ptr::null_mut()).map_or("it supports no processor of this kind".to_owned(), |e| e.message))
+            Unusable(
+                last_error(&functions, std::ptr::null_mut())
+                    .map_or("it supports no processor of this kind".to_owned(), |e| e.message),
+            )
         })?;
         let mut device = Self { functions, handle, version: [0; 3], file: file.to_owned(), _library: library };
         device.version = [c"versionMajor", c"versionMinor", c"versionPatch"].map(|name| device.integer(name));
@@ -119,7 +122,12 @@ impl Device {
     pub fn filter(&self, size: [usize; 2], inputs: Inputs, output: &mut [Triple]) -> Result<()> {
         let pictures = [(c"color", inputs.color), (c"albedo", inputs.albedo), (c"normal", inputs.normal)];
         let pixels = size[0].checked_mul(size[1]);
-        if [Some(&*output)].into_iter().chain(pictures.iter().map(|(_, picture)| *picture)).flatten().any(|p| Some(p.len()) != pixels) {
+        if [Some(&*output)]
+            .into_iter()
+            .chain(pictures.iter().map(|(_, picture)| *picture))
+            .flatten()
+            .any(|p| Some(p.len()) != pixels)
+        {
             return Err(Error::Internal(format!("a picture to denoise has not {} x {} pixels", size[0], size[1])));
         }
         let filter = Filter::new(self)?;
@@ -166,7 +174,9 @@ impl Device {
     fn check(&self) -> Result<()> {
         match last_error(&self.functions, self.handle.as_ptr()) {
             None => Ok(()),
-            Some(Fault { code: sys::ERROR_OUT_OF_MEMORY, message }) => Err(Error::OutOfMemory(format!("Open Image Denoise: {message}"))),
+            Some(Fault { code: sys::ERROR_OUT_OF_MEMORY, message }) => {
+                Err(Error::OutOfMemory(format!("Open Image Denoise: {message}")))
+            }
             Some(Fault { message, .. }) => Err(Error::Internal(format!("Open Image Denoise: {message}"))),
         }
     }
@@ -195,7 +205,8 @@ impl<'d> Filter<'d> {
         // SAFETY: the device is alive and the name ends in NUL.
         let handle = unsafe { (device.functions.new_filter)(device.handle.as_ptr(), c"RT".as_ptr()) };
         device.check()?;
-        let handle = NonNull::new(handle).ok_or_else(|| Error::Internal("Open Image Denoise has no filter RT".to_owned()))?;
+        let handle =
+            NonNull::new(handle).ok_or_else(|| Error::Internal("Open Image Denoise has no filter RT".to_owned()))?;
         Ok(Self { device, handle })
     }
 }

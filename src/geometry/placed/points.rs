@@ -55,7 +55,13 @@ pub(super) fn sample(placed: &TransformedShape, u: &[Row; 2], count: usize, out:
 }
 
 #[inline(always)]
-fn sample_on<S: LaneShape>(placed: &TransformedShape, shape: &S, u: &[Row; 2], count: usize, out: &mut WorldSampleRows) {
+fn sample_on<S: LaneShape>(
+    placed: &TransformedShape,
+    shape: &S,
+    u: &[Row; 2],
+    count: usize,
+    out: &mut WorldSampleRows,
+) {
     for i in 0..count.next_multiple_of(16).min(BATCH) {
         let sample = shape.sample(pair(u, i).map(f64::from));
         let point = placed.place(sample.p, sample.n, sample.pdf_area);

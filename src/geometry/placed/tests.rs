@@ -8,7 +8,8 @@ use crate::geometry::testing::endless;
 use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::math::{DMat3, Rng, dvec3};
 
-const NO_HIT: Hit = Hit { t: f32::INFINITY, u: 0.0, v: 0.0, shape: ShapeId(0), prim: PrimId(0), instance: InstanceId(u32::MAX) };
+const NO_HIT: Hit =
+    Hit { t: f32::INFINITY, u: 0.0, v: 0.0, shape: ShapeId(0), prim: PrimId(0), instance: InstanceId(u32::MAX) };
 
 fn interaction(placed: &TransformedShape, ray: &Ray) -> Option<SurfaceInteraction> {
     let local = placed.intersect(ray)?;

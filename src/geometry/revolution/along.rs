@@ -76,12 +76,18 @@ impl Along {
         match self {
             Self::Curve => {
                 let count = segments.len() as f64;
-                Parameter { v: ((at.segment as f64 + at.s) / count).clamp(0.0, 1.0), change: segment.derivative(at.s) * count }
+                Parameter {
+                    v: ((at.segment as f64 + at.s) / count).clamp(0.0, 1.0),
+                    change: segment.derivative(at.s) * count,
+                }
             }
             Self::Height(range) => {
                 let (height, tangent) = (range.max - range.min, segment.tangent(at.s));
                 let slope = tangent.y.abs().max(LEAST_SLOPE).copysign(tangent.y);
-                Parameter { v: ((segment.z.value(at.s) - range.min) / height).clamp(0.0, 1.0), change: tangent * (height / slope) }
+                Parameter {
+                    v: ((segment.z.value(at.s) - range.min) / height).clamp(0.0, 1.0),
+                    change: tangent * (height / slope),
+                }
             }
             Self::ArcLength(lengths) => {
                 let total = lengths[lengths.len() - 1];

@@ -83,7 +83,9 @@ impl Search<'_> {
         // A ray along the axis has no closest point: the NaN gives way to the lower end.
         let closest = (-self.b / self.a).max(lo).min(hi);
         let (reach, hole) = (segment.r_range.max + slack, (segment.r_range.min - slack).max(0.0));
-        lo <= hi && squared(closest) <= reach * reach + slack * scale && squared(lo).max(squared(hi)) >= hole * hole - slack * scale
+        lo <= hi
+            && squared(closest) <= reach * reach + slack * scale
+            && squared(lo).max(squared(hi)) >= hole * hole - slack * scale
     }
 
     /// Roots of `F(s) = d.z² (r² - c) - zeta (a zeta + 2 b d.z)` with `zeta = z - o.z`: `d.z²` times the surface's
@@ -118,7 +120,8 @@ impl Search<'_> {
             let slope = d_z_squared * r * segment.r.derivative(s) - segment.z.derivative(s) * (a * zeta + b * d_z);
             (value, 2.0 * slope)
         };
-        let terms = d_z_squared * (segment.r_range.max * segment.r_range.max + c) + (a * scale + two_b_d_z.abs()) * scale;
+        let terms =
+            d_z_squared * (segment.r_range.max * segment.r_range.max + c) + (a * scale + two_b_d_z.abs()) * scale;
         isolate_roots(&coefficients, NOISE * terms, &mut |bracket| {
             let s = newton_in_bracket(&bracket, f);
             self.offer((segment.z.value(s) - o_z) / d_z, index + s);
@@ -139,7 +142,9 @@ impl Search<'_> {
         };
         let slack = CULL_SLACK * (size + level.z.abs());
         for (index, segment) in segments.iter().enumerate() {
-            let reach = (segment.r_range.max * segment.r_range.max - level.h_squared).max(0.0).sqrt() * level.climb.abs() + slack;
+            let reach = (segment.r_range.max * segment.r_range.max - level.h_squared).max(0.0).sqrt()
+                * level.climb.abs()
+                + slack;
             let is_outside = |low: f64, high: f64| level.z + reach < low || level.z - reach > high;
             if segment.r_range.max < level.h || is_outside(segment.z_range.min, segment.z_range.max) {
                 continue;

@@ -11,7 +11,8 @@ const VASE: &[[f64; 2]] = &[[0.0, -1.0], [0.9, -1.0], [1.2, -0.3], [0.5, 0.2], [
 const LOOPING: &[[f64; 2]] = &[[0.2, -0.8], [2.5, 1.2], [0.1, 1.4], [1.2, -0.7], [1.6, -1.2], [0.3, 0.4], [0.5, 1.0]];
 /// Half a circle in two segments.
 const ROUND: f64 = 0.552_284_749_8;
-const CIRCLE: &[[f64; 2]] = &[[0.0, -1.0], [ROUND, -1.0], [1.0, -ROUND], [1.0, 0.0], [1.0, ROUND], [ROUND, 1.0], [0.0, 1.0]];
+const CIRCLE: &[[f64; 2]] =
+    &[[0.0, -1.0], [ROUND, -1.0], [1.0, -ROUND], [1.0, 0.0], [1.0, ROUND], [ROUND, 1.0], [0.0, 1.0]];
 
 fn turned(points: &[[f64; 2]]) -> Revolution {
     Revolution::new(&Profile::bezier(points).unwrap(), TAU).unwrap()
@@ -40,7 +41,9 @@ fn level_rays_inside_and_outside_hit_on_both_sides() {
     for dy in [0.0, -0.0, 1e-300, -1e-12, 1e-5] {
         let from_outside = all_hits(&vase, &endless(dvec3(-3.0, -0.5, 0.1), dvec3(1.0, dy, 0.0)));
         assert_eq!(from_outside.len(), 2, "{dy} {from_outside:?}");
-        assert!(from_outside[0] < 3.0 && from_outside[1] > 3.0 && (from_outside[0] + from_outside[1] - 6.0).abs() < 1e-3);
+        assert!(
+            from_outside[0] < 3.0 && from_outside[1] > 3.0 && (from_outside[0] + from_outside[1] - 6.0).abs() < 1e-3
+        );
         let from_inside = all_hits(&vase, &endless(dvec3(0.0, -0.5, 0.1), dvec3(1.0, dy, 0.0)));
         assert_eq!(from_inside.len(), 1, "{dy}");
         assert!((from_inside[0] + 3.0 - from_outside[1]).abs() < 1e-4);
@@ -67,7 +70,11 @@ fn samples_weighted_by_their_density_are_uniform() {
         }
         let total: f64 = counts.iter().sum::<f64>() / COUNT as f64;
         // Relative spread of 1 / pdf is below 0.1 except next to the poles.
-        assert!((total / shape.area() - 1.0).abs() < 5.0 * 0.2 / (COUNT as f64).sqrt() + 1e-3, "{total} {}", shape.area());
+        assert!(
+            (total / shape.area() - 1.0).abs() < 5.0 * 0.2 / (COUNT as f64).sqrt() + 1e-3,
+            "{total} {}",
+            shape.area()
+        );
         for (weight, n) in counts.iter().zip(area) {
             assert!((weight / n / shape.area() - 1.0).abs() < 0.02, "{} {}", weight / n, shape.area());
         }
@@ -88,8 +95,17 @@ fn profiles_that_make_no_surface_are_refused() {
 #[test]
 fn standing_profiles_have_normals() {
     // Tripled ends and a cusp inside.
-    let spline =
-        Profile::b_spline(&[[0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [1.0, 0.5], [1.0, 0.5], [1.0, 0.5], [0.0, 1.0], [0.0, 1.0], [0.0, 1.0]]);
+    let spline = Profile::b_spline(&[
+        [0.0, 0.0],
+        [0.0, 0.0],
+        [0.0, 0.0],
+        [1.0, 0.5],
+        [1.0, 0.5],
+        [1.0, 0.5],
+        [0.0, 1.0],
+        [0.0, 1.0],
+        [0.0, 1.0],
+    ]);
     let shape = Revolution::new(&spline.unwrap(), TAU).unwrap();
     let ray = endless(dvec3(0.0, -1.0, 0.0), DVec3::Y);
     for profile in [0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0] {
@@ -100,8 +116,9 @@ fn standing_profiles_have_normals() {
 
 #[test]
 fn v_is_the_height_or_the_length_of_the_profile() {
-    let v =
-        |shape: &Revolution, profile: f64| shape.surface(&endless(dvec3(0.0, -9.0, 0.0), DVec3::Y), &LocalHit { t: 1.0, profile }).uv[1];
+    let v = |shape: &Revolution, profile: f64| {
+        shape.surface(&endless(dvec3(0.0, -9.0, 0.0), DVec3::Y), &LocalHit { t: 1.0, profile }).uv[1]
+    };
     let of = |points: &[[f64; 2]], parameter| turned(points).with_parameter(parameter).unwrap();
     // Half a circle: heights are cosines, lengths are angles, as far as cubics make one (7e-6).
     let profile = Profile::bezier(CIRCLE).unwrap();
@@ -119,9 +136,15 @@ fn v_is_the_height_or_the_length_of_the_profile() {
     for i in 0..=16 {
         let s = f64::from(i) / 16.0;
         let eased = s * s * (3.0 - 2.0 * s);
-        assert!((v(&height, s) - (2.0 + eased) / 3.0).abs() < 1e-14 && (v(&length, s) - eased / total).abs() < 1e-13, "{s}");
+        assert!(
+            (v(&height, s) - (2.0 + eased) / 3.0).abs() < 1e-14 && (v(&length, s) - eased / total).abs() < 1e-13,
+            "{s}"
+        );
         let second = (3.0 * (1.0 - s) / 3.0, (1.0 + s * 18f64.sqrt()) / total);
-        assert!((v(&height, 1.0 + s) - second.0).abs() < 1e-14 && (v(&length, 1.0 + s) - second.1).abs() < 1e-13, "{s}");
+        assert!(
+            (v(&height, 1.0 + s) - second.0).abs() < 1e-14 && (v(&length, 1.0 + s) - second.1).abs() < 1e-13,
+            "{s}"
+        );
     }
     let level = turned(&line([0.0, 1.0], [1.0, 1.0]));
     assert_eq!(level.clone().with_parameter(ProfileParameter::Height), Err(ShapeError::ProfileLevel));

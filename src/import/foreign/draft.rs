@@ -7,14 +7,15 @@ use std::sync::Arc;
 use super::{ImportReport, Imported, Outcome, ReportEntry};
 use crate::assets::{Assets, MeshData, RgbImage};
 use crate::desc::{
-    CameraDesc, InstanceDesc, KeyframeDesc, LightDesc, MaterialDesc, ObjectDesc, SceneDesc, ShapeDesc, TextureDesc, TransformDesc,
-    TransformStepDesc,
+    CameraDesc, InstanceDesc, KeyframeDesc, LightDesc, MaterialDesc, ObjectDesc, SceneDesc, ShapeDesc, TextureDesc,
+    TransformDesc, TransformStepDesc,
 };
 use crate::image_data::ImageData;
 use crate::math::{DAffine3, DMat3, DVec3, Transform};
 
 /// What becomes of samplers of independent numbers: another set of points changes no mean, so they count as mapped.
-pub const SOBOL_FOR_INDEPENDENT: &str = "Sobol points, with the same mean and less noise (--sampler independent for independent numbers)";
+pub const SOBOL_FOR_INDEPENDENT: &str =
+    "Sobol points, with the same mean and less noise (--sampler independent for independent numbers)";
 
 /// A scene under construction: names are made unique, and the places where things come from are kept for messages.
 #[derive(Debug, Default)]
@@ -54,7 +55,13 @@ impl Draft {
     }
 
     /// Adds an object under `name` or one like it, its shapes with their places; the result is its name.
-    pub fn add_object(&mut self, name: &str, place: &str, shapes: Vec<(String, ShapeDesc)>, instances: Vec<InstanceDesc>) -> String {
+    pub fn add_object(
+        &mut self,
+        name: &str,
+        place: &str,
+        shapes: Vec<(String, ShapeDesc)>,
+        instances: Vec<InstanceDesc>,
+    ) -> String {
         let name = self.numbers.unique("object", name, |name| self.desc.objects.contains_key(name));
         self.places.insert(format!("objects.{name}"), place.into());
         let mut object = ObjectDesc { shapes: Vec::new(), instances };
@@ -147,7 +154,13 @@ impl Draft {
 
     /// Reports what became of a parameter of an element, with a note.
     pub fn note(&mut self, place: &str, element: &str, parameter: &str, outcome: Outcome, note: String) {
-        self.report.entries.push(ReportEntry { place: place.into(), element: element.into(), parameter: parameter.into(), outcome, note });
+        self.report.entries.push(ReportEntry {
+            place: place.into(),
+            element: element.into(),
+            parameter: parameter.into(),
+            outcome,
+            note,
+        });
     }
 
     /// The scene.
@@ -193,7 +206,8 @@ impl Numbers {
 
     /// As [`unique`](Self::unique), for a file that any system can write.
     fn unique_file(&mut self, name: &str, extension: &'static str, assets: &Assets) -> String {
-        let plain: String = name.chars().map(|c| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' }).take(60).collect();
+        let plain: String =
+            name.chars().map(|c| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' }).take(60).collect();
         let stem = self.unique(extension, &plain, |stem| assets.contains(&format!("{stem}.{extension}")));
         format!("{stem}.{extension}")
     }
@@ -206,14 +220,17 @@ mod tests {
     #[test]
     fn names_are_unique_and_files_are_plain() {
         let mut draft = Draft::default();
-        let names: Vec<String> = (0..3).map(|_| draft.add_texture("a", "x:1", TextureDesc::Constant { color: [0.0; 3] })).collect();
+        let names: Vec<String> =
+            (0..3).map(|_| draft.add_texture("a", "x:1", TextureDesc::Constant { color: [0.0; 3] })).collect();
         assert_eq!(names, ["a", "a_2", "a_3"]);
         // One that has the next number of its own.
         draft.add_texture("a_4", "x:1", TextureDesc::Constant { color: [0.0; 3] });
         assert_eq!(draft.add_texture("a", "x:1", TextureDesc::Constant { color: [0.0; 3] }), "a_5");
         // The square of this number would take minutes.
         let last = (0..50_000)
-            .map(|_| draft.add_material("", "x:1", MaterialDesc::Mirror { reflectance: crate::desc::ColorDesc::Grey(1.0) }))
+            .map(|_| {
+                draft.add_material("", "x:1", MaterialDesc::Mirror { reflectance: crate::desc::ColorDesc::Grey(1.0) })
+            })
             .last();
         assert_eq!(last.as_deref(), Some("unnamed_50000"));
         let files: Vec<String> = (0..2).map(|_| draft.keep_mesh("../ä b", MeshData::default())).collect();

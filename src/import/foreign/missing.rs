@@ -21,7 +21,13 @@ impl Imported {
         let before = self.report.entries.len();
         let mut report = |place: &str, element: &str, file: &str| {
             let (place, element, note) = (place.to_owned(), element.to_owned(), format!("there is no file {file}"));
-            self.report.entries.push(ReportEntry { place, element, parameter: "file".into(), outcome: Outcome::Ignored, note });
+            self.report.entries.push(ReportEntry {
+                place,
+                element,
+                parameter: "file".into(),
+                outcome: Outcome::Ignored,
+                note,
+            });
         };
 
         let mut is_whole = |place: &str, shape: &ShapeDesc| {
@@ -52,7 +58,9 @@ impl Imported {
         }
         // Objects that have nothing left take their instances with them.
         let objects = &self.desc.objects;
-        let is_empty = |name: &str| objects.get(name).is_some_and(|object| object.shapes.is_empty() && object.instances.is_empty());
+        let is_empty = |name: &str| {
+            objects.get(name).is_some_and(|object| object.shapes.is_empty() && object.instances.is_empty())
+        };
         retain("instances", &mut self.desc.instances, places, |_, instance| !is_empty(&instance.object));
         self.report.entries.len() - before
     }
@@ -60,7 +68,12 @@ impl Imported {
 
 /// Retains the entries of a list for which `keep` is true, and the places of what is kept in step with it. `keep` is
 /// given the place of each, or its path.
-fn retain<T>(path: &str, list: &mut Vec<T>, places: &mut BTreeMap<String, String>, mut keep: impl FnMut(&str, &T) -> bool) {
+fn retain<T>(
+    path: &str,
+    list: &mut Vec<T>,
+    places: &mut BTreeMap<String, String>,
+    mut keep: impl FnMut(&str, &T) -> bool,
+) {
     let (mut index, mut kept) = (0, 0);
     list.retain(|item| {
         let own_path = format!("{path}[{index}]");
@@ -89,10 +102,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("s.json");
         std::fs::write(folder.path().join("here.ply"), "ply").unwrap();
-        let scene = r#"{ "camera": {}, "textures": { "t": { "type": "image", "file": "no.png" }, "u": { "type": "checker" } },
-            "shapes": [{ "type": "mesh", "file": "no.ply" }, { "type": "mesh", "file": "here.ply" }, { "type": "sphere" }],
+        let scene = r#"{ "camera": {}, "textures": { "t": { "type": "image", "file": "no.png" },
+            "u": { "type": "checker" } },
+            "shapes": [{ "type": "mesh", "file": "no.ply" }, { "type": "mesh", "file": "here.ply" },
+            { "type": "sphere" }],
             "objects": { "o": { "shapes": [{ "type": "mesh", "file": "no.obj" }] } }, "instances": [{ "object": "o" }],
-            "lights": [{ "type": "environment", "file": "no.exr" }, { "type": "environment", "radiance": [1, 1, 1] }] }"#;
+            "lights": [{ "type": "environment", "file": "no.exr" },
+            { "type": "environment", "radiance": [1, 1, 1] }] }"#;
         std::fs::write(&path, scene).unwrap();
         let mut imported = read_scene(&path, &ImportOptions::default()).unwrap();
         assert_eq!(imported.leave_out_missing(&path), 4);
@@ -104,7 +120,8 @@ mod tests {
 
     #[test]
     fn places_stay_with_what_they_belong_to() {
-        let mut places: BTreeMap<String, String> = (0..4).map(|i| (format!("shapes[{i}]"), format!("line {i}"))).collect();
+        let mut places: BTreeMap<String, String> =
+            (0..4).map(|i| (format!("shapes[{i}]"), format!("line {i}"))).collect();
         places.insert("lights[0]".into(), "line 9".into());
         let mut list = vec![0, 1, 2, 3];
         retain("shapes", &mut list, &mut places, |place, item| {

@@ -68,7 +68,13 @@ pub fn read_scene(path: &Path, options: &ImportOptions) -> Result<Imported> {
         "gltf" | "glb" => gltf::read(path, options),
         _ => {
             let desc = load_scene(path)?;
-            Ok(Imported { desc, assets: Arc::default(), report: ImportReport::default(), files: Arc::default(), places: Arc::default() })
+            Ok(Imported {
+                desc,
+                assets: Arc::default(),
+                report: ImportReport::default(),
+                files: Arc::default(),
+                places: Arc::default(),
+            })
         }
     }
 }

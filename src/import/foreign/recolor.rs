@@ -12,11 +12,19 @@ use crate::image_data::{ImageData, Samples};
 
 /// A texture like the one of this name, whose colours times `factor` are changed; its name. `None` if it is of a kind
 /// that cannot be changed, or has no readable image, which is found out when the scene is compiled.
-pub fn recolored(draft: &mut Draft, folder: &Path, name: &str, factor: [f32; 3], change: &dyn Fn(f32) -> f32) -> Option<String> {
+pub fn recolored(
+    draft: &mut Draft,
+    folder: &Path,
+    name: &str,
+    factor: [f32; 3],
+    change: &dyn Fn(f32) -> f32,
+) -> Option<String> {
     let each = |color: [f32; 3]| std::array::from_fn(|i| change(color[i] * factor[i]));
     let texture = match draft.desc.textures.get(name).cloned()? {
         TextureDesc::Constant { color } => TextureDesc::Constant { color: each(color) },
-        TextureDesc::Checker { color0, color1, scale } => TextureDesc::Checker { color0: each(color0), color1: each(color1), scale },
+        TextureDesc::Checker { color0, color1, scale } => {
+            TextureDesc::Checker { color0: each(color0), color1: each(color1), scale }
+        }
         TextureDesc::Image { file, color_space, filter, wrap, scale, rotation_degrees, offset, channel, invert } => {
             if invert || channel == Some(ChannelDesc::A) {
                 return None;
@@ -76,7 +84,9 @@ mod tests {
         draft.add_texture("a", "", TextureDesc::Constant { color: [0.5; 3] });
         draft.add_texture("b", "", TextureDesc::Product { factors: Vec::new() });
         let name = recolored(&mut draft, Path::new(""), "a", [1.0, 0.5, 0.0], &f32::sqrt).unwrap();
-        assert!(matches!(draft.desc.textures[&name], TextureDesc::Constant { color } if color == [0.5f32.sqrt(), 0.5, 0.0]));
+        assert!(
+            matches!(draft.desc.textures[&name], TextureDesc::Constant { color } if color == [0.5f32.sqrt(), 0.5, 0.0])
+        );
         assert!(recolored(&mut draft, Path::new(""), "b", [1.0; 3], &f32::sqrt).is_none());
         assert!(recolored(&mut draft, Path::new(""), "c", [1.0; 3], &f32::sqrt).is_none());
     }

@@ -69,8 +69,11 @@ impl ImportReport {
         let is_listed = |entry: &&ReportEntry| entry.outcome != Outcome::Mapped && entry.note != PART_OF_IGNORED;
         for entry in self.entries.iter().filter(is_listed) {
             let kind: Vec<&str> = entry.element.split(" \"").take(1).collect();
-            let what =
-                [&kind.concat(), entry.parameter.as_str()].into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join(": ");
+            let what = [&kind.concat(), entry.parameter.as_str()]
+                .into_iter()
+                .filter(|text| !text.is_empty())
+                .collect::<Vec<_>>()
+                .join(": ");
             let note = if entry.note.is_empty() { what } else { format!("{what}: {}", entry.note) };
             if entry.outcome == Outcome::Ignored && entry.parameter.is_empty() {
                 whole.insert(note.clone());
@@ -82,8 +85,9 @@ impl ImportReport {
             let times = if count > 1 { format!(" ({count} times, first at {place})") } else { format!(" ({place})") };
             format!("{outcome}: {what}{times}")
         };
-        let (first, second): (Vec<_>, Vec<_>) =
-            kinds.into_iter().partition(|((Reverse(outcome), note), _)| *outcome == Outcome::Ignored && whole.contains(note));
+        let (first, second): (Vec<_>, Vec<_>) = kinds
+            .into_iter()
+            .partition(|((Reverse(outcome), note), _)| *outcome == Outcome::Ignored && whole.contains(note));
         (first.into_iter().map(line).collect(), second.into_iter().map(line).collect())
     }
 }
@@ -93,7 +97,13 @@ mod tests {
     use super::*;
 
     fn entry(element: &str, outcome: Outcome, note: &str) -> ReportEntry {
-        ReportEntry { place: "s.xml:1:2".into(), element: element.into(), parameter: "alpha".into(), outcome, note: note.into() }
+        ReportEntry {
+            place: "s.xml:1:2".into(),
+            element: element.into(),
+            parameter: "alpha".into(),
+            outcome,
+            note: note.into(),
+        }
     }
 
     #[test]
@@ -104,7 +114,10 @@ mod tests {
         report.entries.push(entry("bsdf plastic \"b\"", Outcome::Approximated, "GGX in place of Beckmann"));
         report.entries.push(entry("bsdf plastic \"c\"", Outcome::Approximated, "GGX in place of Beckmann"));
         report.entries.push(entry("shape hair", Outcome::Ignored, "there are no curves"));
-        report.entries.push(ReportEntry { parameter: String::new(), ..entry("shape sdfgrid", Outcome::Ignored, "unsupported shape") });
+        report.entries.push(ReportEntry {
+            parameter: String::new(),
+            ..entry("shape sdfgrid", Outcome::Ignored, "unsupported shape")
+        });
         report.entries.push(entry("shape sdfgrid", Outcome::Ignored, PART_OF_IGNORED));
         assert!(!report.is_exact());
         assert_eq!((report.count(Outcome::Approximated), report.count(Outcome::Ignored)), (2, 3));

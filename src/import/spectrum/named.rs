@@ -92,7 +92,9 @@ mod tests {
     #[test]
     fn metals_reflect_as_their_spectra() {
         // Under D65, from the tables of luxpop.com.
-        for (metal, expected) in [("Ag", [0.9715, 0.9599, 0.9153]), ("Al", [0.9132, 0.9215, 0.9245]), ("Cu", [0.9554, 0.6376, 0.5382])] {
+        for (metal, expected) in
+            [("Ag", [0.9715, 0.9599, 0.9153]), ("Al", [0.9132, 0.9215, 0.9245]), ("Cu", [0.9554, 0.6376, 0.5382])]
+        {
             let part = |part: &str| named(&format!("metal-{metal}-{part}")).unwrap().rgb();
             let (eta, k) = (part("eta"), part("k"));
             for i in 0..3 {

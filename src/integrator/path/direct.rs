@@ -72,9 +72,16 @@ fn eval_non_diffuse(context: &Context, vertices: &mut Vertices, rows: &mut BsdfS
 /// Samples a light for each vertex that is not all mirror.
 fn choose_lights(context: &Context, vertices: &mut Vertices, queue: &mut LightQueue) {
     let (scene, lights) = (context.scene, &context.scene.lights);
-    let light_context = LightContext { geometry: &scene.geometry, textures: &scene.textures, lights, compensation: context.compensation };
+    let light_context = LightContext {
+        geometry: &scene.geometry,
+        textures: &scene.textures,
+        lights,
+        compensation: context.compensation,
+    };
     queue.clear();
-    for lane in (0..vertices.count.min(BATCH)).filter(|&lane| vertices.rows.flags[lane] & (vertex_flags::DELTA | vertex_flags::MISS) == 0) {
+    for lane in (0..vertices.count.min(BATCH))
+        .filter(|&lane| vertices.rows.flags[lane] & (vertex_flags::DELTA | vertex_flags::MISS) == 0)
+    {
         let from = vertices.light_context(lane);
         queue.push(&light_context, lane, &from, vertices.u_light.of(lane), &mut vertices.light_samples);
     }
@@ -139,7 +146,11 @@ fn illuminate<const PERTURBED: bool>(
 /// and the shading normal and of these.
 #[inline(always)]
 pub(super) fn shadowing<const PERTURBED: bool>(test: HemisphereTest, [cos, cos_local, cos_normals]: [f32; 3]) -> f32 {
-    if PERTURBED & test.in_frame & test.in_geometry & (cos_normals != 0.0) { terminator_factor(cos, cos_local, cos_normals) } else { 1.0 }
+    if PERTURBED & test.in_frame & test.in_geometry & (cos_normals != 0.0) {
+        terminator_factor(cos, cos_local, cos_normals)
+    } else {
+        1.0
+    }
 }
 
 /// Whether a ray may start above the facet that hides its direction. Under a normal or bump map the factor has darkened

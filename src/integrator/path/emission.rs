@@ -48,7 +48,13 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
 }
 
 /// The light of a surface with what it emits against `ray`, weighted by MIS; `None` if it is no emitter.
-fn emitted(context: &Context, paths: &PathRows, i: usize, ray: &Ray, at: &SurfaceInteraction) -> Option<(LightId, Rgb)> {
+fn emitted(
+    context: &Context,
+    paths: &PathRows,
+    i: usize,
+    ray: &Ray,
+    at: &SurfaceInteraction,
+) -> Option<(LightId, Rgb)> {
     let scene = context.scene;
     let id = scene.surface(at.shape).light(at.prim)?;
     let Light::Area(light) = scene.lights.get(id) else { return None };

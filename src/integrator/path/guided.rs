@@ -57,7 +57,9 @@ pub(super) type Regions<'a> = [Option<GuideRegion<'a>>; BATCH];
 /// Finds the regions of a block's vertices.
 pub(super) fn find_regions<'a>(guide: &'a Guide, vertices: &Vertices) -> Regions<'a> {
     let mut regions = [None; BATCH];
-    for (lane, region) in regions.iter_mut().enumerate().take(vertices.count).filter(|&(lane, _)| is_guided(vertices, lane)) {
+    for (lane, region) in
+        regions.iter_mut().enumerate().take(vertices.count).filter(|&(lane, _)| is_guided(vertices, lane))
+    {
         *region = guide.at(vertices.points.p.get(lane).as_vec3(), vertices.facing_normal(lane));
     }
     regions
@@ -74,7 +76,8 @@ pub(super) fn mix_scatter_pdfs(regions: &Regions, vertices: &mut Vertices) {
     let Vertices { light_samples, direct, .. } = vertices;
     for (lane, region) in regions.iter().enumerate().take(vertices.count) {
         if let (Some(region), true) = (region, light_samples.target[lane] != light_target::NONE) {
-            direct.scatter_pdf[lane] = mixed(region, [direct.scatter_pdf[lane], region.directions.pdf(light_samples.direction.get(lane))]);
+            direct.scatter_pdf[lane] =
+                mixed(region, [direct.scatter_pdf[lane], region.directions.pdf(light_samples.direction.get(lane))]);
         }
     }
 }
@@ -142,7 +145,9 @@ impl GuideRecorder {
     /// Records the directions of the paths that go on.
     pub fn record(&mut self, vertices: &Vertices, paths: &PathRows) {
         let scatter = &vertices.scatter;
-        for lane in (0..vertices.count).filter(|&lane| scatter.status[lane] == spawn::SPAWNED && scatter.is_delta[lane] == 0) {
+        for lane in
+            (0..vertices.count).filter(|&lane| scatter.status[lane] == spawn::SPAWNED && scatter.is_delta[lane] == 0)
+        {
             if !is_guided(vertices, lane) {
                 continue;
             }
@@ -174,9 +179,12 @@ impl GuideRecorder {
         for vertex in &mut self.vertices {
             let incident = out.batch.pixels[vertex.slot as usize].radiance - vertex.radiance_before;
             // What a channel has gained whose throughput is zero is rounding.
-            let of_channel = |incident: f32, weight: f32, all: f32| if all > 0.0 { (incident * (weight / all)).max(0.0) } else { 0.0 };
+            let of_channel = |incident: f32, weight: f32, all: f32| {
+                if all > 0.0 { (incident * (weight / all)).max(0.0) } else { 0.0 }
+            };
             let (w, t) = (vertex.weight, vertex.throughput);
-            let channels = [of_channel(incident.r, w.r, t.r), of_channel(incident.g, w.g, t.g), of_channel(incident.b, w.b, t.b)];
+            let channels =
+                [of_channel(incident.r, w.r, t.r), of_channel(incident.g, w.g, t.g), of_channel(incident.b, w.b, t.b)];
             vertex.record.light = Rgb::from(channels).mean();
             guide.record(&vertex.record);
         }

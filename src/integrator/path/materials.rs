@@ -138,7 +138,11 @@ fn evaluate_textured(context: &Context, vertices: &mut Vertices) {
             Bsdf::Lambert(Lambert { albedo }) => set_diffuse(vertices, lane, albedo),
             bsdf => {
                 set_non_diffuse(&mut vertices.rows, &mut vertices.non_diffuse, lane, &bsdf);
-                let group = if textured.can_be_grouped() && bsdf.can_vary() { Some(VARYING | vertices.bsdfs.ids[lane]) } else { None };
+                let group = if textured.can_be_grouped() && bsdf.can_vary() {
+                    Some(VARYING | vertices.bsdfs.ids[lane])
+                } else {
+                    None
+                };
                 vertices.bsdfs.set_made(lane, bsdf);
                 if let Some(group) = group {
                     vertices.bsdfs.groups[lane] = group;
@@ -192,8 +196,10 @@ pub(super) fn replace_bsdfs(context: &Context, wave: &mut Wave, block: usize) {
         }
         let paths = &paths[block];
         if let Some(regularization) = regularization.filter(|_| paths.flags[path] & path_flags::ANY_NON_SPECULAR != 0)
-            && let Some(rougher) =
-                vertices.bsdfs.get(context.scene, lane).and_then(|bsdf| bsdf.with_min_alpha(regularization.alpha(paths.sample[path])))
+            && let Some(rougher) = vertices
+                .bsdfs
+                .get(context.scene, lane)
+                .and_then(|bsdf| bsdf.with_min_alpha(regularization.alpha(paths.sample[path])))
         {
             replace(vertices, lane, rougher);
         }

@@ -37,7 +37,8 @@ pub(super) fn pass_boundaries(context: &Context, wave: &mut Wave) -> u64 {
         if matches!(segment.ior, Some(RelativeIor::Dispersed(_))) {
             // The path follows one of the colours, which are refracted differently.
             let seed = PixelSeed(paths.seed[i]);
-            let channel = ((3.0 * context.config.sampler.sample_4d(seed, paths.sample[i], dimensions::COLOR)[0]) as usize).min(2);
+            let channel =
+                ((3.0 * context.config.sampler.sample_4d(seed, paths.sample[i], dimensions::COLOR)[0]) as usize).min(2);
             let mut only = [0.0; 3];
             only[channel] = 3.0;
             paths.throughput.set(i, paths.throughput.get(i) * Rgb::from(only));
@@ -57,9 +58,16 @@ pub(super) fn absorb_direct(context: &Context, vertices: &mut Vertices, media: &
         let at = vertices.interaction(lane);
         let from = vertices.rows.direction.get(lane);
         let direct = &mut vertices.direct;
-        let ray = Ray { t_max: direct.shadow_end[lane], ..Ray::new(direct.shadow_origin.get(lane), direct.shadow_direction.get(lane)) };
-        let inside =
-            context.world.media_toward(&at, from, ray.direction, &media[block * BATCH + vertices.rows.path[lane] as usize].current);
+        let ray = Ray {
+            t_max: direct.shadow_end[lane],
+            ..Ray::new(direct.shadow_origin.get(lane), direct.shadow_direction.get(lane))
+        };
+        let inside = context.world.media_toward(
+            &at,
+            from,
+            ray.direction,
+            &media[block * BATCH + vertices.rows.path[lane] as usize].current,
+        );
         direct.contribution.set(lane, direct.contribution.get(lane) * context.world.transmittance(&inside, &ray));
     }
 }
@@ -68,5 +76,8 @@ pub(super) fn absorb_direct(context: &Context, vertices: &mut Vertices, media: &
 pub(super) fn after(context: &Context, vertices: &Vertices, lane: usize, state: &MediaState) -> MediaState {
     let at = vertices.interaction(lane);
     let to = vertices.scatter.direction.get(lane);
-    MediaState { current: context.world.media_toward(&at, vertices.rows.direction.get(lane), to, &state.current), ..*state }
+    MediaState {
+        current: context.world.media_toward(&at, vertices.rows.direction.get(lane), to, &state.current),
+        ..*state
+    }
 }

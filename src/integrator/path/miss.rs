@@ -90,7 +90,10 @@ impl Miss<'_> {
         if radiance.is_black() {
             return Rgb::BLACK;
         }
-        radiance * super::emission::bsdf_mis_weight(context, paths, i, || pdf * lights.pmf(id, &paths.from(i), context.compensation))
+        radiance
+            * super::emission::bsdf_mis_weight(context, paths, i, || {
+                pdf * lights.pmf(id, &paths.from(i), context.compensation)
+            })
     }
 
     #[inline(never)]

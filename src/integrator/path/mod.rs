@@ -116,7 +116,8 @@ impl PathIntegrator {
         let PassContext { world, render, guide } = *pass;
         let Workspace { out, counts, paths: PathBuffers(wave) } = workspace;
         let (compensation, out) = (self.strategy.compensation(), &mut Output { batch: out });
-        let mut context = Context { config: self, pass, world, scene: world.scene, bounce: 0, is_last: false, compensation };
+        let mut context =
+            Context { config: self, pass, world, scene: world.scene, bounce: 0, is_last: false, compensation };
         wave.start(&context, samples);
         for bounce in 0..self.max_depth {
             if wave.count == 0 || (bounce % cancel::BOUNCES == 0 && render.is_cancel_due()) {

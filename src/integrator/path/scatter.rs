@@ -139,7 +139,8 @@ fn spawn_rays<const PERTURBED: bool>(
         scatter.direction.set(i, direction);
         let is_delta = scatter.is_delta[i] != 0;
         let specular = if is_delta | no_lights { path_flags::SPECULAR } else { 0 };
-        let non_specular = if is_delta { rows.path_flags[i] & path_flags::ANY_NON_SPECULAR } else { path_flags::ANY_NON_SPECULAR };
+        let non_specular =
+            if is_delta { rows.path_flags[i] & path_flags::ANY_NON_SPECULAR } else { path_flags::ANY_NON_SPECULAR };
         scatter.path_flags[i] = specular | non_specular;
         scatter.status[i] = spawn::status(goes_on & test.agrees(), goes_on & can_be_below(rows, test, i));
     }

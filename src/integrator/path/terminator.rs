@@ -32,7 +32,9 @@ pub(super) fn offset(
     for lane in 0..vertices.count {
         if status(vertices)[lane] == spawn::BELOW_FACET {
             status(vertices)[lane] = spawn::NONE;
-            if let Some((start, way)) = terminator_start(context.world, &vertices.interaction(lane), vertices.facing_normal(lane)) {
+            if let Some((start, way)) =
+                terminator_start(context.world, &vertices.interaction(lane), vertices.facing_normal(lane))
+            {
                 rays.set(lanes.len(), &way);
                 lanes.push(lane as u8);
                 starts.push(start);

@@ -25,13 +25,17 @@ pub(super) fn find(context: &Context, wave: &mut Wave, block: usize) {
     let mut triangles = 0;
     for lane in 0..vertices.count.min(BATCH) {
         let Vertices { rows, triangles: corners, .. } = vertices;
-        let mesh =
-            if rows.instance[lane] == Hit::NO_INSTANCE.0 { context.world.mesh_without_tangents(ShapeId(rows.shape[lane])) } else { None };
+        let mesh = if rows.instance[lane] == Hit::NO_INSTANCE.0 {
+            context.world.mesh_without_tangents(ShapeId(rows.shape[lane]))
+        } else {
+            None
+        };
         rows.is_unresolved[lane] = u32::from(mesh.is_none());
         if let Some(mesh) = mesh {
             triangles += 1;
             // The positions are gathered in a loop of their own: here all lanes wait for memory together.
-            [corners.a_index[lane], corners.b_index[lane], corners.c_index[lane]] = mesh.triangles()[rows.prim[lane] as usize];
+            [corners.a_index[lane], corners.b_index[lane], corners.c_index[lane]] =
+                mesh.triangles()[rows.prim[lane] as usize];
         }
     }
     if triangles > 0 {
@@ -107,7 +111,9 @@ fn resolve_analytic(context: &Context, vertices: &mut Vertices, rays: &RayRows, 
     });
     lanes.sort_unstable_by_key(|&lane| u64::from(rows.shape[usize::from(lane)]) << 8 | u64::from(lane));
     for lanes in lanes.chunk_by(|&a, &b| rows.shape[usize::from(a)] == rows.shape[usize::from(b)]) {
-        let Shape::Analytic(placed) = context.scene.geometry.shape(ShapeId(rows.shape[usize::from(lanes[0])])) else { continue };
+        let Shape::Analytic(placed) = context.scene.geometry.shape(ShapeId(rows.shape[usize::from(lanes[0])])) else {
+            continue;
+        };
         if lanes.len() < MIN_ANALYTIC_LANES {
             continue;
         }

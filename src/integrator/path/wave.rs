@@ -102,10 +102,18 @@ pub(super) struct ShadowQueue {
 
 /// Appends the chosen `$lanes` of rows, and of rows of vectors, to columns of a block and the next.
 macro_rules! append {
-    ($lanes:expr, $at:expr, $to:expr, $next:expr, { $($row:expr => $column:ident,)* }, { $($vectors:expr => $vector_column:ident,)* }) => {{
+    (
+        $lanes:expr, $at:expr, $to:expr, $next:expr,
+        { $($row:expr => $column:ident,)* },
+        { $($vectors:expr => $vector_column:ident,)* }
+    ) => {{
         let (to, mut next) = ($to, $next);
         $($lanes.append(&$row, &mut to.$column, next.as_mut().map(|next| &mut next.$column), $at);)*
-        $($lanes.append_3(&$vectors.0, &mut to.$vector_column.0, next.as_mut().map(|next| &mut next.$vector_column.0), $at);)*
+        $(
+            $lanes.append_3(
+                &$vectors.0, &mut to.$vector_column.0, next.as_mut().map(|next| &mut next.$vector_column.0), $at
+            );
+        )*
     }};
 }
 
@@ -216,7 +224,10 @@ impl Wave {
             points.p => from_p,
             rows.light_context_n => from_n,
         });
-        append!(lanes, at, rays, next_rays, { rows.time => time, }, { scatter.origin => origin, scatter.direction => direction, });
+        append!(
+            lanes, at, rays, next_rays, { rows.time => time, },
+            { scatter.origin => origin, scatter.direction => direction, }
+        );
         *survivors += lanes.len();
     }
 

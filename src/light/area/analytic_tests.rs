@@ -122,12 +122,14 @@ fn emitters_sampled_together_have_the_bits_of_those_sampled_alone() {
     let mut shapes = partial();
     shapes.push(("sphere", sphere()));
     let maps = [skew([1.0, 2.0, 0.5]), skew([0.7; 3])];
-    let placed = shapes
-        .iter()
-        .flat_map(|(_, shape)| maps.map(|map| Shape::Analytic(TransformedShape::new(shape.clone(), Transform::new(map).unwrap()))));
+    let placed = shapes.iter().flat_map(|(_, shape)| {
+        maps.map(|map| Shape::Analytic(TransformedShape::new(shape.clone(), Transform::new(map).unwrap())))
+    });
     let geometry = Geometry { shapes: placed.collect(), ..Geometry::default() };
     let lights: Vec<_> = (0..geometry.shapes.len())
-        .flat_map(|i| [WHITE, TWO_SIDED].map(|emission| AreaLight::new(ShapeId::new(i), PrimId(0), emission, &geometry, &[])))
+        .flat_map(|i| {
+            [WHITE, TWO_SIDED].map(|emission| AreaLight::new(ShapeId::new(i), PrimId(0), emission, &geometry, &[]))
+        })
         .filter(|light| matches!(light.form, Form::Sphere(_) | Form::TransformedShape { .. }))
         .collect();
     let mut random = Rng::new(31);
@@ -139,15 +141,18 @@ fn emitters_sampled_together_have_the_bits_of_those_sampled_alone() {
     for kinds in [1, 2, 4, 4, 4, 4, lights.len()] {
         queue.clear();
         let first = random.below(lights.len());
-        let vertices: Vec<_> =
-            (0..BATCH).map(|_| ((first + random.below(kinds)) % lights.len(), random.cube() * 5.0 - 2.0, random.pair())).collect();
+        let vertices: Vec<_> = (0..BATCH)
+            .map(|_| ((first + random.below(kinds)) % lights.len(), random.cube() * 5.0 - 2.0, random.pair()))
+            .collect();
         let numbers = SampleRows::new(&vertices.iter().map(|(_, _, [u, v])| [0.0, *u, *v, 0.0]).collect::<Vec<_>>());
         for (lane, (i, p, _)) in vertices.iter().enumerate() {
             points.set(lane, *p);
             assert!(queue.push(&lights[*i], LightId::new(*i), lane));
         }
         let mut found = vec![None; BATCH];
-        queue.sample(&context, &LightQueries { count: BATCH, points: &points, u: &numbers }, |lane, sample| found[lane] = Some(*sample));
+        queue.sample(&context, &LightQueries { count: BATCH, points: &points, u: &numbers }, |lane, sample| {
+            found[lane] = Some(*sample);
+        });
         for ((i, p, u), found) in vertices.iter().zip(&found) {
             let alone = lights[*i].sample(&geometry, &[], *p, *u);
             assert_eq!(found.as_ref().map(words), alone.as_ref().map(words), "{i} {p} {u:?}");

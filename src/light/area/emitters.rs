@@ -36,7 +36,8 @@ struct EmitterRows {
 
 impl Default for EmitterQueue {
     fn default() -> Self {
-        let rows = EmitterRows { u: [[0.0; BATCH]; 2], views: ViewRows::default(), samples: WorldSampleRows::default() };
+        let rows =
+            EmitterRows { u: [[0.0; BATCH]; 2], views: ViewRows::default(), samples: WorldSampleRows::default() };
         Self { entries: Vec::with_capacity(BATCH), rows }
     }
 }
@@ -76,8 +77,11 @@ impl EmitterQueue {
             };
             for (i, &(_, lane)) in group.iter().enumerate() {
                 let (p, u) = queries.get(lane);
-                let sample =
-                    if is_in_rows { sample_of_row(light, &rows.views, i) } else { light.sample(context.geometry, context.textures, p, u) };
+                let sample = if is_in_rows {
+                    sample_of_row(light, &rows.views, i)
+                } else {
+                    light.sample(context.geometry, context.textures, p, u)
+                };
                 if let Some(sample) = sample {
                     set(lane, &sample);
                 }
@@ -91,7 +95,9 @@ impl EmitterRows {
     fn sample(&mut self, light: &AreaLight, geometry: &Geometry, count: usize) -> bool {
         let Self { u, views, samples } = self;
         match (&light.form, geometry.shape(light.shape)) {
-            (Form::Sphere(sphere), _) if !sphere.inward && (0..count.min(BATCH)).all(|i| sphere.sees_front(views.p.get(i))) => {
+            (Form::Sphere(sphere), _)
+                if !sphere.inward && (0..count.min(BATCH)).all(|i| sphere.sees_front(views.p.get(i))) =>
+            {
                 vectorize!(sample_sphere(sphere, u, views, count));
                 true
             }

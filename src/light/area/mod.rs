@@ -184,7 +184,9 @@ impl AreaLight {
             if let Some(form) = Form::two_triangles(mesh).filter(|_| emission.is_even()) {
                 return vec![Self { shape, prim: first, emission, luminance: emission.radiance.luminance(), form }];
             }
-            return (0..mesh.triangles().len()).map(|i| Self::new(shape, PrimId::new(i), emission, geometry, textures)).collect();
+            return (0..mesh.triangles().len())
+                .map(|i| Self::new(shape, PrimId::new(i), emission, geometry, textures))
+                .collect();
         }
         vec![Self::new(shape, first, emission, geometry, textures)]
     }
@@ -213,7 +215,8 @@ impl AreaLight {
             Form::Parallelogram(quad) => (quad.sample_textured(p, u, self.emission.two_sided)?, quad.error),
             _ => self.sample_surface(geometry, p, u)?,
         };
-        let radiance = self.emission.expected(textures, &textured::point(geometry.shape(self.shape), self.prim, sample.p, u));
+        let radiance =
+            self.emission.expected(textures, &textured::point(geometry.shape(self.shape), self.prim, sample.p, u));
         Some(sample.with_radiance(radiance, error))
     }
 
@@ -300,7 +303,9 @@ impl AreaLight {
         let (bounds, normal) = match &self.form {
             Form::Sphere(_) => (shape.bounds(), None),
             Form::Parallelogram(quad) => (shape.bounds(), Some(quad.normal())),
-            Form::Triangle { .. } => (shape.prim_bounds(self.prim), self.triangle(geometry).map(|triangle| triangle.normal())),
+            Form::Triangle { .. } => {
+                (shape.prim_bounds(self.prim), self.triangle(geometry).map(|triangle| triangle.normal()))
+            }
             Form::TransformedShape { .. } => (shape.bounds(), flat_normal(shape)),
         };
         let cone = normal.map_or(EmissionCone::SPHERE, EmissionCone::flat);
@@ -359,19 +364,23 @@ impl Form {
         let (origin, far) = (corner.as_dvec3(), opposite.as_dvec3());
         let (edge_u, edge_v) = (next.as_dvec3() - origin, last.as_dvec3() - origin);
         let gap = (origin + edge_u + edge_v - far).abs().max_element();
-        let largest = [origin, far, next.as_dvec3(), last.as_dvec3()].iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+        let largest =
+            [origin, far, next.as_dvec3(), last.as_dvec3()].iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
         if gap > 4.0 * UNIT_ROUNDOFF * largest {
             return None;
         }
         let error = triangle_error(&first).max(triangle_error(&second)) + gap as f32;
-        ParallelogramEmitter::new(origin, [edge_u, edge_v], first.cross(), error).map(|quad| Self::Parallelogram(Box::new(quad)))
+        ParallelogramEmitter::new(origin, [edge_u, edge_v], first.cross(), error)
+            .map(|quad| Self::Parallelogram(Box::new(quad)))
     }
 }
 
 /// Unit normal of a flat shape, towards its front.
 fn flat_normal(shape: &Shape) -> Option<Vec3> {
     match shape {
-        Shape::Analytic(placed) if matches!(placed.shape, Analytic::Disk(_) | Analytic::Quad(_)) => Some(placed.sample_area([0.5; 2]).n),
+        Shape::Analytic(placed) if matches!(placed.shape, Analytic::Disk(_) | Analytic::Quad(_)) => {
+            Some(placed.sample_area([0.5; 2]).n)
+        }
         _ => None,
     }
 }

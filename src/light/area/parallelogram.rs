@@ -83,7 +83,12 @@ impl Parallelogram {
         let (x0, y0) = (d.dot(self.axis_u), d.dot(self.axis_v));
         let (x1, y1, height) = (x0 + self.length_u, y0 + self.length_v, d.dot(self.normal).abs());
         let h2 = height * height;
-        let corners = [product(x0, x0, y0, y0, h2), product(x1, x1, y0, y0, h2), product(x1, x1, y1, y1, h2), product(x0, x0, y1, y1, h2)];
+        let corners = [
+            product(x0, x0, y0, y0, h2),
+            product(x1, x1, y0, y0, h2),
+            product(x1, x1, y1, y1, h2),
+            product(x0, x0, y1, y1, h2),
+        ];
         View { x0, x1, y0, y1, height, corners }
     }
 
@@ -250,8 +255,10 @@ impl View {
         // Both triangles have the same volume with the point; they share the diagonal from 00 to 11.
         let volume = height * (x1 - x0) * (y1 - y0);
         let diagonal = product(x0, x1, y0, y1, h2);
-        let lower = l00 * l10 * l11 + product(x0, x1, y0, y0, h2) * l11 + diagonal * l10 + product(x1, x1, y0, y1, h2) * l00;
-        let upper = l00 * l11 * l01 + diagonal * l01 + product(x0, x0, y0, y1, h2) * l11 + product(x1, x0, y1, y1, h2) * l00;
+        let lower =
+            l00 * l10 * l11 + product(x0, x1, y0, y0, h2) * l11 + diagonal * l10 + product(x1, x1, y0, y1, h2) * l00;
+        let upper =
+            l00 * l11 * l01 + diagonal * l01 + product(x0, x0, y0, y1, h2) * l11 + product(x1, x0, y1, y1, h2) * l00;
         let imaginary = volume * (lower + upper);
         let real = lower * upper - volume * volume;
         // Scaled into the range of f32.
@@ -277,7 +284,8 @@ impl View {
         let (l00, l01) = (corners[0].sqrt(), corners[3].sqrt());
 
         // Cosines of the side planes' normals with the plane's normal; the sines are the height times the reciprocals.
-        let (r_x0, r_y0, r_y1) = (1.0 / (x0 * x0 + h2).sqrt(), 1.0 / (y0 * y0 + h2).sqrt(), 1.0 / (y1 * y1 + h2).sqrt());
+        let (r_x0, r_y0, r_y1) =
+            (1.0 / (x0 * x0 + h2).sqrt(), 1.0 / (y0 * y0 + h2).sqrt(), 1.0 / (y1 * y1 + h2).sqrt());
         let (b_x0, b_y0, b_y1) = (x0 * r_x0, y0 * r_y0, y1 * r_y1);
 
         // The inner angles at the corners (x0, y1) and (x0, y0), between the planes of the sides that meet there.

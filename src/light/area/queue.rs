@@ -84,7 +84,13 @@ impl Default for AreaQueue {
 
 impl NearQueue {
     /// Replaces the samples of those vertices.
-    fn sample(&mut self, shapes: &ParallelogramRows, queries: &LightQueries, views: &mut ViewRows, target_p: &mut Points) {
+    fn sample(
+        &mut self,
+        shapes: &ParallelogramRows,
+        queries: &LightQueries,
+        views: &mut ViewRows,
+        target_p: &mut Points,
+    ) {
         let Self { lanes, u, shapes: near_shapes, points, views: near_views } = self;
         let mut near = 0;
         for lane in (0..queries.count.min(BATCH)).filter(|&lane| views.is_near[lane] != 0.0) {
@@ -130,7 +136,8 @@ impl AreaQueue {
         if self.ids[lane] != id.0 {
             self.ids[lane] = id.0;
             self.emissions.radiance.set(lane, light.emission.radiance);
-            (self.emissions.error[lane], self.emissions.two_sided[lane]) = (quad.error, u32::from(light.emission.two_sided));
+            (self.emissions.error[lane], self.emissions.two_sided[lane]) =
+                (quad.error, u32::from(light.emission.two_sided));
             self.shapes.set(lane, &quad.shape);
         }
         true
@@ -171,7 +178,13 @@ fn sample_by_area(
 }
 
 #[inline(always)]
-fn sample_by_solid_angle(shapes: &ParallelogramRows, u: &[Row; 2], points: &mut NearRows, views: &mut ViewRows, count: usize) {
+fn sample_by_solid_angle(
+    shapes: &ParallelogramRows,
+    u: &[Row; 2],
+    points: &mut NearRows,
+    views: &mut ViewRows,
+    count: usize,
+) {
     for i in 0..count.next_multiple_of(16).min(BATCH) {
         let (p, q) = (points.p.get(i), points.q.get(i));
         let View { wi, pdf, .. } = views.get(i);

@@ -67,7 +67,13 @@ pub(super) fn assert_samples_are_hits(geometry: &Geometry, light: &AreaLight, p:
 }
 
 /// Asserts that what flows through a sphere around a light is its power.
-pub(super) fn assert_power_flows_out(geometry: &Geometry, light: &AreaLight, center: DVec3, radius: f64, tolerance: f64) {
+pub(super) fn assert_power_flows_out(
+    geometry: &Geometry,
+    light: &AreaLight,
+    center: DVec3,
+    radius: f64,
+    tolerance: f64,
+) {
     let mut random = Rng::new(11);
     let n = 100_000;
     let mut sum = 0.0;
@@ -171,7 +177,8 @@ fn queued_samples_have_the_bits_of_single_ones() {
     let mut points = Points::ZERO;
     for count in [1, 16, 100, BATCH] {
         queue.clear();
-        let vertices: Vec<_> = (0..count).map(|_| (random.below(lights.len()), random.cube() * 3.0, random.pair())).collect();
+        let vertices: Vec<_> =
+            (0..count).map(|_| (random.below(lights.len()), random.cube() * 3.0, random.pair())).collect();
         let numbers = SampleRows::new(&vertices.iter().map(|(_, _, [u, v])| [0.0, *u, *v, 0.0]).collect::<Vec<_>>());
         // One in eight is not queued.
         let is_queued = |lane: usize| lane % 8 != 3;
@@ -215,8 +222,10 @@ fn each_light_has_its_own_area() {
 
 #[test]
 fn only_parallelograms_are_single_lights() {
-    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [1.2, 1.1, 0.0], [1.0, 1.0, 1e-3]];
-    let count = |triangles: &[[u32; 3]]| AreaLight::for_shape(ShapeId(0), WHITE, &scene(&corners, triangles), &[]).len();
+    let corners =
+        [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [1.2, 1.1, 0.0], [1.0, 1.0, 1e-3]];
+    let count =
+        |triangles: &[[u32; 3]]| AreaLight::for_shape(ShapeId(0), WHITE, &scene(&corners, triangles), &[]).len();
     for rotation in 0..3 {
         let turned = |t: [u32; 3]| [t[rotation], t[(rotation + 1) % 3], t[(rotation + 2) % 3]];
         assert_eq!(count(&[[0, 1, 2], turned([0, 2, 3])]), 1);
@@ -243,9 +252,12 @@ fn triangles_without_area_give_no_light() {
 
 #[test]
 fn a_point_almost_in_a_rectangle_sees_it_evenly() {
-    let quad = ParallelogramEmitter::new(DVec3::new(-1.0, -0.5, 0.0), [DVec3::X * 3.0, DVec3::Y * 2.0], DVec3::Z, 0.0).unwrap();
+    let quad = ParallelogramEmitter::new(DVec3::new(-1.0, -0.5, 0.0), [DVec3::X * 3.0, DVec3::Y * 2.0], DVec3::Z, 0.0)
+        .unwrap();
     // Above the inside the rectangle fills a hemisphere, above an edge half of it, above a corner a quarter.
-    for (x, y, from, to) in [(0.3, 0.4, -PI, PI), (-1.0, 0.4, -0.5 * PI, 0.5 * PI), (-1.0, -0.5, 0.0, 0.5 * PI), (1.5, 1.5, -PI, 0.0)] {
+    for (x, y, from, to) in
+        [(0.3, 0.4, -PI, PI), (-1.0, 0.4, -0.5 * PI, 0.5 * PI), (-1.0, -0.5, 0.0, 0.5 * PI), (1.5, 1.5, -PI, 0.0)]
+    {
         for height in [1e-12, 1e-8, 1e-5] {
             let p = DVec3::new(x, y, height);
             let (mut counts, mut random) = (vec![0u32; 256], Rng::new(3));

@@ -50,7 +50,8 @@ pub(super) fn density(brightness: impl Fn(&Footprint) -> f32) -> Option<Piecewis
     let mut weights = vec![0.0; CELLS * CELLS];
     for y in 0..n {
         for x in 0..n {
-            weights[y / LOOKUPS * CELLS + x / LOOKUPS] += brightness(&Footprint::point(Vec2::new(middle(x), middle(y))));
+            weights[y / LOOKUPS * CELLS + x / LOOKUPS] +=
+                brightness(&Footprint::point(Vec2::new(middle(x), middle(y))));
         }
     }
     Piecewise2d::new(CELLS, CELLS, &weights)

@@ -140,7 +140,13 @@ impl EnvironmentScratch {
 }
 
 /// The radiance at locations.
-fn look_up(map: &EnvironmentMap, locations: &LocationRows, count: usize, corners: &mut CornerRows, radiance: &mut RgbRows) {
+fn look_up(
+    map: &EnvironmentMap,
+    locations: &LocationRows,
+    count: usize,
+    corners: &mut CornerRows,
+    radiance: &mut RgbRows,
+) {
     for i in 0..count.min(BATCH) {
         let [a, b, c, d] = map.corners(locations.x[i] as usize, locations.y[i] as usize);
         corners.upper_left.set(i, a);
@@ -168,7 +174,11 @@ fn find_directions(
     count: usize,
 ) {
     for i in 0..count.next_multiple_of(16).min(BATCH) {
-        let (wi, at) = map.direction_in([cells.x[i], cells.y[i]], [cells.u[i], cells.v[i]], [cells.upper_cosine[i], cells.lower_cosine[i]]);
+        let (wi, at) = map.direction_in(
+            [cells.x[i], cells.y[i]],
+            [cells.u[i], cells.v[i]],
+            [cells.upper_cosine[i], cells.lower_cosine[i]],
+        );
         locations.set(i, at);
         samples.wi.set(i, wi);
         samples.pdf[i] = cells.pmf[i] * <f32 as Element>::get(&cells.inverse_solid_angle, i);

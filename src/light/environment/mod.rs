@@ -54,9 +54,10 @@ impl Environment {
     #[inline]
     pub fn eval(&self, wi: Vec3, compensation: MisCompensation) -> InfiniteLightEval {
         match self {
-            Self::Constant(radiance) => {
-                InfiniteLightEval { radiance: *radiance, pdf: if compensation == MisCompensation::On { 0.0 } else { UNIFORM_SPHERE_PDF } }
-            }
+            Self::Constant(radiance) => InfiniteLightEval {
+                radiance: *radiance,
+                pdf: if compensation == MisCompensation::On { 0.0 } else { UNIFORM_SPHERE_PDF },
+            },
             Self::Map(map) => {
                 let at = map.locate(wi);
                 InfiniteLightEval { radiance: map.lookup(at), pdf: map.pdf(at, compensation) }
@@ -159,7 +160,13 @@ impl EnvironmentMap {
     ///
     /// # Errors
     /// If the count is wrong, a texel is not finite, or `rotation` is not orthonormal.
-    pub fn new(width: usize, height: usize, pixels: Vec<Rgb>, rotation: DMat3, scale: f32) -> Result<Self, EnvironmentMapError> {
+    pub fn new(
+        width: usize,
+        height: usize,
+        pixels: Vec<Rgb>,
+        rotation: DMat3,
+        scale: f32,
+    ) -> Result<Self, EnvironmentMapError> {
         if pixels.is_empty() || width.checked_mul(height) != Some(pixels.len()) {
             return Err(EnvironmentMapError::Size { width, height, texels: pixels.len() });
         }
@@ -189,7 +196,9 @@ impl EnvironmentMap {
     fn weights(&self, compensation: MisCompensation) -> Vec<f64> {
         // Negative channels (of colours out of gamut) must not cancel others: such a texel is not black.
         let brightness = |t: Rgb| f64::from(t.map(f32::abs).luminance());
-        let row = |y: usize| -> Vec<f64> { self.texels[y * self.width..(y + 1) * self.width].iter().map(|&t| brightness(t)).collect() };
+        let row = |y: usize| -> Vec<f64> {
+            self.texels[y * self.width..(y + 1) * self.width].iter().map(|&t| brightness(t)).collect()
+        };
         let solid_angle = |y: usize| (self.cosines[y] - self.cosines[y + 1]) * 2.0 * PI / self.width as f64;
         let mut weights = Vec::with_capacity(self.width * (self.height + 1));
         let mut upper = row(0);
@@ -199,8 +208,9 @@ impl EnvironmentMap {
             weights.extend((0..self.width).map(|x| 0.25 * (upper[x] + upper[right(x)] + lower[x] + lower[right(x)])));
             upper = lower;
         }
-        let rows =
-            |weights: &[f64]| -> f64 { weights.chunks(self.width).zip(0..).map(|(row, y)| row.iter().sum::<f64>() * solid_angle(y)).sum() };
+        let rows = |weights: &[f64]| -> f64 {
+            weights.chunks(self.width).zip(0..).map(|(row, y)| row.iter().sum::<f64>() * solid_angle(y)).sum()
+        };
         let found_without = match compensation {
             MisCompensation::Off => 0.0,
             MisCompensation::On => rows(&weights) / (4.0 * PI),

@@ -50,7 +50,9 @@ fn the_density_is_finite_at_the_poles_and_at_texel_corners() {
     for d in [Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z, Vec3::X, Vec3::new(1e-20, 1.0, 0.0), Vec3::new(0.0, -1.0, -1e-30)] {
         let at = map.locate(d);
         assert!(
-            map.pdf(at, MisCompensation::Off).is_finite() && map.pdf(at, MisCompensation::Off) > 0.0 && map.lookup(at).is_finite(),
+            map.pdf(at, MisCompensation::Off).is_finite()
+                && map.pdf(at, MisCompensation::Off) > 0.0
+                && map.lookup(at).is_finite(),
             "{d}"
         );
     }
@@ -95,7 +97,9 @@ fn power_is_the_light_from_all_sides() {
     let n = 400;
     let mut sum = 0.0;
     for i in 0..n * n {
-        let s = environment.sample([((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32], MisCompensation::Off).unwrap();
+        let s = environment
+            .sample([((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32], MisCompensation::Off)
+            .unwrap();
         sum += f64::from(s.radiance.luminance() / s.pdf);
     }
     let power = PI * 9.0 * sum / f64::from(n * n);
@@ -111,7 +115,10 @@ fn a_constant_environment_is_sampled_uniformly() {
     let (mut counts, mut random) = (vec![0u32; 100], Rng::new(2));
     for _ in 0..100_000 {
         let s = environment.sample(random.pair(), MisCompensation::Off).unwrap();
-        assert!((s.pdf - environment.eval(s.wi, MisCompensation::Off).pdf).abs() < 1e-9 && (s.wi.length() - 1.0).abs() < 1e-6);
+        assert!(
+            (s.pdf - environment.eval(s.wi, MisCompensation::Off).pdf).abs() < 1e-9
+                && (s.wi.length() - 1.0).abs() < 1e-6
+        );
         let i = ((0.5 + 0.5 * s.wi.x) * 10.0) as usize;
         let j = ((s.wi.y.atan2(s.wi.z) / TAU as f32 + 0.5) * 10.0) as usize;
         counts[i.min(9) * 10 + j.min(9)] += 1;
@@ -164,7 +171,11 @@ fn beside_even_directions_only_what_is_brighter_than_the_mean_is_sampled() {
             let at = environment.eval(s.wi, compensation);
             // Rounding takes directions at a limit to the next cell.
             strays += u32::from((at.pdf - s.pdf).abs() > 1e-5 * s.pdf);
-            add(sums, light(s.wi) * response(s.wi) / (f64::from(s.pdf) + EVEN) + light(even) * response(even) / (pdf(even) + EVEN));
+            add(
+                sums,
+                light(s.wi) * response(s.wi) / (f64::from(s.pdf) + EVEN)
+                    + light(even) * response(even) / (pdf(even) + EVEN),
+            );
         }
         // Cells are as bright as their corners in the middle, so that dark directions share a cell with bright ones at
         // most.
@@ -180,7 +191,9 @@ fn beside_even_directions_only_what_is_brighter_than_the_mean_is_sampled() {
     // Of an even sky nothing is left.
     let even = [Environment::Constant(Rgb::WHITE), self::environment(map(8, 4, |_, _| 2.0))];
     for sky in even {
-        assert!(sky.sample([0.3, 0.6], MisCompensation::On).is_none() && sky.eval(Vec3::X, MisCompensation::On).pdf == 0.0);
+        assert!(
+            sky.sample([0.3, 0.6], MisCompensation::On).is_none() && sky.eval(Vec3::X, MisCompensation::On).pdf == 0.0
+        );
         assert!(sky.sampled_power(1.0, MisCompensation::On) == 0.0 && sky.power(1.0) > 0.0);
     }
 }
@@ -203,7 +216,10 @@ fn many_directions_at_once_are_each_of_them() {
                 let InfiniteLightEval { radiance, pdf } = sky.eval(directions.get(i), compensation);
                 assert_eq!((evals.radiance.get(i), evals.pdf[i]), (radiance, pdf));
                 let one = sky.sample(*u, compensation).unwrap();
-                assert_eq!((one.wi, one.radiance, one.pdf), (samples.wi.get(i), samples.radiance.get(i), samples.pdf[i]));
+                assert_eq!(
+                    (one.wi, one.radiance, one.pdf),
+                    (samples.wi.get(i), samples.radiance.get(i), samples.pdf[i])
+                );
             }
         }
     }

@@ -45,8 +45,11 @@ fn cost(bounds: &LightBounds) -> f32 {
 impl LightTree {
     /// A tree over those of the lights that have bounds; `None` if there are none.
     pub fn new(lights: &[Option<LightBounds>]) -> Option<Self> {
-        let mut items: Vec<Item> =
-            lights.iter().enumerate().filter_map(|(i, bounds)| bounds.map(|bounds| Item { light: i as u32, bounds })).collect();
+        let mut items: Vec<Item> = lights
+            .iter()
+            .enumerate()
+            .filter_map(|(i, bounds)| bounds.map(|bounds| Item { light: i as u32, bounds }))
+            .collect();
         if items.is_empty() {
             return None;
         }
@@ -110,7 +113,8 @@ fn split(items: &mut [Item], group: &Group, depth: u32) -> usize {
     }
     let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
     let middle = items.len() / 2;
-    items.select_nth_unstable_by(middle, |a, b| center(a)[axis].total_cmp(&center(b)[axis]).then(a.light.cmp(&b.light)));
+    items
+        .select_nth_unstable_by(middle, |a, b| center(a)[axis].total_cmp(&center(b)[axis]).then(a.light.cmp(&b.light)));
     group.start + middle
 }
 

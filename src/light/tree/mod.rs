@@ -111,7 +111,9 @@ impl LightTree {
     /// Bytes of the tables.
     #[cfg(test)]
     pub fn memory_bytes(&self) -> usize {
-        size_of_val(self.nodes.as_slice()) + size_of_val(self.node_places.as_slice()) + size_of_val(self.light_places.as_slice())
+        size_of_val(self.nodes.as_slice())
+            + size_of_val(self.node_places.as_slice())
+            + size_of_val(self.light_places.as_slice())
     }
 }
 

@@ -3,7 +3,8 @@ use crate::color::Rgb;
 use crate::geometry::{Analytic, Disk, Geometry, Mesh, Quad, Shape, Sphere, TransformedShape};
 use crate::id::{LightId, ShapeId};
 use crate::light::{
-    AreaLight, Emission, Environment, IesLight, IesProfile, Light, LightSelection, LightSet, MisCompensation, PointLight, SpotLight,
+    AreaLight, Emission, Environment, IesLight, IesProfile, Light, LightSelection, LightSet, MisCompensation,
+    PointLight, SpotLight,
 };
 use crate::math::{DAffine3, Rng, Transform};
 
@@ -22,14 +23,16 @@ fn cloud(seed: u64, sky: bool) -> (Geometry, LightSet) {
         let (p, q) = (place(), place());
         let power = (0.5 * q.x * 4.0).exp() as f32;
         let emission = Emission { two_sided: i % 3 == 0, ..Emission::constant(Rgb::new(power, 0.5 * power, power)) };
-        let turn = DAffine3::from_axis_angle(q.normalize(), 3.0 * p.y) * DAffine3::from_scale(DVec3::splat(0.02 + 0.2 * q.z.abs()));
+        let turn = DAffine3::from_axis_angle(q.normalize(), 3.0 * p.y)
+            * DAffine3::from_scale(DVec3::splat(0.02 + 0.2 * q.z.abs()));
         let transform = Transform::new(DAffine3::from_translation(p) * turn).unwrap();
         let analytic = match i % 4 {
             0 => Analytic::Quad(Quad::new(DVec3::new(-0.5, -0.5, 0.0), DVec3::X, DVec3::Y).unwrap()),
             1 => Analytic::Sphere(Sphere::new(0.5, -0.5, 0.5, std::f64::consts::TAU).unwrap()),
             2 => Analytic::Disk(Disk::new(0.7, 0.2, 4.0).unwrap()),
             _ => {
-                triangles.extend([p, p + 0.1 * q, p + 0.1 * DVec3::new(q.y, -q.x, q.z)].map(|v| v.as_vec3().to_array()));
+                triangles
+                    .extend([p, p + 0.1 * q, p + 0.1 * DVec3::new(q.y, -q.x, q.z)].map(|v| v.as_vec3().to_array()));
                 continue;
             }
         };
@@ -48,8 +51,15 @@ fn cloud(seed: u64, sky: bool) -> (Geometry, LightSet) {
         let (p, q) = (place(), place());
         let intensity = Rgb::splat(0.01 * (i + 1) as f32);
         lights.push(Light::Point(PointLight { position: p, intensity }));
-        lights.push(Light::Spot(Box::new(SpotLight::new(p, q, intensity, 0.2 * f64::from(i), 0.3 + 0.5 * f64::from(i)))));
-        let profile = IesProfile::new(vec![0.0, 30.0 + 25.0 * i as f32], vec![0.0, 180.0], vec![1.0, 2.0, 3.0, 0.0]).unwrap();
+        lights.push(Light::Spot(Box::new(SpotLight::new(
+            p,
+            q,
+            intensity,
+            0.2 * f64::from(i),
+            0.3 + 0.5 * f64::from(i),
+        ))));
+        let profile =
+            IesProfile::new(vec![0.0, 30.0 + 25.0 * i as f32], vec![0.0, 180.0], vec![1.0, 2.0, 3.0, 0.0]).unwrap();
         lights.push(Light::Ies(Box::new(IesLight::new(p, q, 0.4, intensity, profile.into()))));
     }
     lights.push(Light::Point(PointLight { position: DVec3::ZERO, intensity: Rgb::BLACK }));
@@ -85,7 +95,9 @@ fn whatever_can_shine_somewhere_can_be_chosen_there() {
         for (light, pmf) in set.lights().iter().zip(pmfs(&set, &from)) {
             let mut arrives = false;
             for _ in 0..16 {
-                let Some(s) = light.sample(&geometry, &[], from.p, random.pair(), MisCompensation::Off) else { continue };
+                let Some(s) = light.sample(&geometry, &[], from.p, random.pair(), MisCompensation::Off) else {
+                    continue;
+                };
                 arrives |= s.radiance.luminance() > 0.0 && (from.n == Vec3::ZERO || s.wi.dot(from.n) > 0.0);
             }
             assert!(pmf > 0.0 || !arrives, "{from:?} {light:?}");
@@ -99,7 +111,8 @@ fn whatever_can_shine_somewhere_can_be_chosen_there() {
 
 #[test]
 fn near_lights_are_preferred_to_strong_ones_far_away() {
-    let point = |x: f64, intensity: f32| Light::Point(PointLight { position: DVec3::X * x, intensity: Rgb::splat(intensity) });
+    let point =
+        |x: f64, intensity: f32| Light::Point(PointLight { position: DVec3::X * x, intensity: Rgb::splat(intensity) });
     let mut lights: Vec<Light> = (0..20).map(|i| point(f64::from(i), 1.0)).collect();
     lights.push(point(100.0, 50.0));
     let set = LightSet::new(lights, &Geometry::default());
@@ -122,8 +135,9 @@ fn any_arrangement_of_lights_makes_a_tree_of_bounded_size() {
     ];
     for (name, place) in arrangements {
         let n = 5_000;
-        let lights: Vec<Option<_>> =
-            (0..n).map(|i| PointLight { position: place(f64::from(i)), intensity: Rgb::splat(1.0 + (i % 7) as f32) }.bounds()).collect();
+        let lights: Vec<Option<_>> = (0..n)
+            .map(|i| PointLight { position: place(f64::from(i)), intensity: Rgb::splat(1.0 + (i % 7) as f32) }.bounds())
+            .collect();
         let tree = LightTree::new(&lights).unwrap();
         assert!(tree.memory_bytes() < 150 * n as usize, "{name}: {} bytes", tree.memory_bytes());
         let from = LightSampleContext { p: DVec3::new(0.3, 0.2, 0.1), n: Vec3::ZERO };

@@ -142,7 +142,8 @@ impl Board {
                 return false;
             }
             // Pages close without a notification: check again now and then.
-            state = self.changed.wait_timeout(state, left.min(PICTURE_PERIOD)).unwrap_or_else(PoisonError::into_inner).0;
+            state =
+                self.changed.wait_timeout(state, left.min(PICTURE_PERIOD)).unwrap_or_else(PoisonError::into_inner).0;
         }
     }
 }

@@ -30,8 +30,8 @@ impl Default for Patience {
 const LINGER: Duration = Duration::from_secs(1);
 
 /// What the page may do: show what is in it, and send requests to its own server.
-const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; img-src data:; \
-                      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; \
+                      img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 /// Why a request is rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -128,7 +128,10 @@ impl Connection {
     pub fn refuse(&mut self, refusal: HttpError) -> io::Result<()> {
         let allow = if refusal == HttpError::Method { "Allow: GET\r\n" } else { "" };
         let (status, length) = (refusal.status(), refusal.status().len());
-        let head = format!("HTTP/1.1 {status}\r\n{allow}Content-Type: text/plain\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n");
+        let head = format!(
+            "HTTP/1.1 {status}\r\n{allow}Content-Type: text/plain\r\nContent-Length: {length}\r\nConnection: close\r\n\
+             \r\n"
+        );
         self.stream.write_all(format!("{head}{status}").as_bytes())?;
         // A connection closed before all of the request is read would take the response with it.
         self.stream.shutdown(Shutdown::Write)?;
@@ -144,11 +147,13 @@ impl Connection {
     pub fn start(&mut self, status: &str, kind: &str, length: u64) -> io::Result<()> {
         let head = format!(
             "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\nCache-Control: no-store\r\n\
-             Content-Security-Policy: {POLICY}\r\nCross-Origin-Resource-Policy: same-origin\r\nX-Content-Type-Options: nosniff\r\n\
+             Content-Security-Policy: {POLICY}\r\nCross-Origin-Resource-Policy: same-origin\r\n\
+             X-Content-Type-Options: nosniff\r\n\
              Referrer-Policy: no-referrer\r\n\r\n"
         );
         // The picture is held until then: who takes it byte by byte must not keep it for ever.
-        self.deadline = Some(Instant::now() + self.patience.stall + Duration::from_secs(length / self.patience.least_rate.max(1)));
+        self.deadline =
+            Some(Instant::now() + self.patience.stall + Duration::from_secs(length / self.patience.least_rate.max(1)));
         self.write(head.as_bytes())
     }
 
@@ -193,14 +198,17 @@ fn parse(bytes: &[u8], host: &str) -> Option<Result<(Request, usize), HttpError>
 }
 
 fn check(request: &httparse::Request, host: &str) -> Result<Request, HttpError> {
-    let values = |name: &'static str| request.headers.iter().filter(move |h| h.name.eq_ignore_ascii_case(name)).map(|h| h.value);
+    let values =
+        |name: &'static str| request.headers.iter().filter(move |h| h.name.eq_ignore_ascii_case(name)).map(|h| h.value);
     if request.method != Some("GET") {
         return Err(HttpError::Method);
     }
     // A request with a body would leave it where the next request is looked for.
     let has_body = values("Transfer-Encoding").next().is_some() || values("Content-Length").any(|value| value != b"0");
     let mut hosts = values("Host");
-    let (Some(requested), None, false) = (hosts.next(), hosts.next(), has_body) else { return Err(HttpError::Malformed) };
+    let (Some(requested), None, false) = (hosts.next(), hosts.next(), has_body) else {
+        return Err(HttpError::Malformed);
+    };
     let requested = std::str::from_utf8(requested).map_err(|_| HttpError::Malformed)?;
     // Browsers send the origin of a request's page; other origins are rejected.
     let from_elsewhere = values("Sec-Fetch-Site").any(|site| site != b"same-origin" && site != b"none");
@@ -221,7 +229,8 @@ fn is_own_host(requested: &str, host: &str) -> bool {
         Some(parts) => parts,
         None => requested.split_at(requested.find(':').unwrap_or(requested.len())),
     };
-    let is_port = port.is_empty() || port.strip_prefix(':').is_some_and(|digits| digits.bytes().all(|byte| byte.is_ascii_digit()));
+    let is_port = port.is_empty()
+        || port.strip_prefix(':').is_some_and(|digits| digits.bytes().all(|byte| byte.is_ascii_digit()));
     is_port && (name == "localhost" || name == host || name.parse::<IpAddr>().is_ok())
 }
 
@@ -238,7 +247,10 @@ mod tests {
         let text = "GET /layer?index=3&page=12 HTTP/1.1\r\nHost: 127.0.0.1:8000\r\n\r\n";
         let request = result(text).unwrap().unwrap();
         assert_eq!((request.path(), request.number("index"), request.number("page")), ("/layer", Some(3), Some(12)));
-        assert_eq!((request.number("x"), parse(format!("{text}GET").as_bytes(), "").unwrap().unwrap().1), (None, text.len()));
+        assert_eq!(
+            (request.number("x"), parse(format!("{text}GET").as_bytes(), "").unwrap().unwrap().1),
+            (None, text.len())
+        );
         for end in 0..text.len() {
             assert_eq!(result(&text[..end]), None, "{end}");
         }
@@ -249,7 +261,14 @@ mod tests {
         for host in ["127.0.0.1:8000", "localhost", "LOCALHOST:1", "[::1]:8000", "192.168.1.7", "node7:80"] {
             assert!(is_own_host(host, "node7"), "{host}");
         }
-        for host in ["", "example.com", "localhost.example.com:8000", "127.0.0.1.example.com", "node7.example.com", "[example.com]:80"] {
+        for host in [
+            "",
+            "example.com",
+            "localhost.example.com:8000",
+            "127.0.0.1.example.com",
+            "node7.example.com",
+            "[example.com]:80",
+        ] {
             assert!(!is_own_host(host, "node7"), "{host}");
         }
         for host in [

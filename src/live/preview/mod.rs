@@ -42,7 +42,12 @@ pub struct PreviewOptions {
 impl Default for PreviewOptions {
     /// Only this machine, any port.
     fn default() -> Self {
-        Self { host: Ipv4Addr::LOCALHOST.to_string(), port: 0, view: ViewDesc::default(), patience: Patience::default() }
+        Self {
+            host: Ipv4Addr::LOCALHOST.to_string(),
+            port: 0,
+            view: ViewDesc::default(),
+            patience: Patience::default(),
+        }
     }
 }
 
@@ -71,8 +76,9 @@ impl Preview {
     /// # Errors
     /// [`Error::Usage`] if the address and port are not to be had.
     pub fn new(options: &PreviewOptions, name: String, statistics: Arc<Statistics>) -> Result<Self> {
-        let unusable =
-            |e: &dyn std::fmt::Display| Error::Usage(format!("--preview: cannot listen at {}:{}: {e}", options.host, options.port));
+        let unusable = |e: &dyn std::fmt::Display| {
+            Error::Usage(format!("--preview: cannot listen at {}:{}: {e}", options.host, options.port))
+        };
         let host = options.host.trim_start_matches('[').trim_end_matches(']');
         let addresses: Vec<_> = (host, options.port).to_socket_addrs().map_err(|e| unusable(&e))?.collect();
         let listener = TcpListener::bind(&addresses[..]).map_err(|e| unusable(&e))?;
@@ -88,7 +94,10 @@ impl Preview {
             closing: AtomicBool::new(false),
         });
         let of_thread = Arc::clone(&shared);
-        std::thread::Builder::new().name("preview".to_owned()).spawn(move || accept(&listener, &of_thread)).map_err(|e| unusable(&e))?;
+        std::thread::Builder::new()
+            .name("preview".to_owned())
+            .spawn(move || accept(&listener, &of_thread))
+            .map_err(|e| unusable(&e))?;
         Ok(Self { shared, address })
     }
 

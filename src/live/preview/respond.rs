@@ -76,7 +76,11 @@ fn layer(connection: &mut Connection, request: &Request, shared: &Shared) -> io:
     let Some((layer, names)) = snapshot.layers().nth(index) else { return not_found(connection) };
     let [width, height] = snapshot.size();
     let head = [shown.version as u32, width, height, names.len() as u32];
-    connection.start(OK, "application/octet-stream", (size_of_val(&head) + layer.data.len() * size_of::<f16>()) as u64)?;
+    connection.start(
+        OK,
+        "application/octet-stream",
+        (size_of_val(&head) + layer.data.len() * size_of::<f16>()) as u64,
+    )?;
     connection.write(&head.map(u32::to_le_bytes).concat())?;
     let (mut halves, mut bytes) = (vec![f16::ZERO; PIECE], Vec::with_capacity(PIECE * size_of::<f16>()));
     for piece in layer.data.chunks(PIECE) {
@@ -101,8 +105,10 @@ fn pixel(request: &Request, shared: &Shared) -> Option<Value> {
     let values = |data: &[f32], channels: usize| -> Vec<Value> {
         data.chunks_exact(channels).nth(index).unwrap_or_default().iter().map(|value| number(*value)).collect()
     };
-    let layers: Vec<Value> =
-        snapshot.layers().map(|(layer, names)| json!({ "channels": names, "values": values(&layer.data, names.len()) })).collect();
+    let layers: Vec<Value> = snapshot
+        .layers()
+        .map(|(layer, names)| json!({ "channels": names, "values": values(&layer.data, names.len()) }))
+        .collect();
     Some(json!({ "version": shown.version, "x": x, "y": y, "layers": layers }))
 }
 
@@ -125,6 +131,9 @@ mod tests {
             assert_eq!(printed.parse::<f32>().unwrap(), value, "{printed}");
         }
         assert_eq!(number(0.1), json!(0.1));
-        assert_eq!([number(f32::NAN), number(f32::INFINITY), number(f32::NEG_INFINITY)], [json!("NaN"), json!("inf"), json!("-inf")]);
+        assert_eq!(
+            [number(f32::NAN), number(f32::INFINITY), number(f32::NEG_INFINITY)],
+            [json!("NaN"), json!("inf"), json!("-inf")]
+        );
     }
 }

@@ -158,8 +158,10 @@ impl Queue {
     /// waits, `unsent` is it. `None` when there is nothing left to send.
     pub fn next(&self, earliest: Instant, unsent: Option<&Arc<Snapshot>>) -> Option<Arc<Snapshot>> {
         let left = earliest.saturating_duration_since(Instant::now());
-        let (mut state, _) =
-            self.changed.wait_timeout_while(self.lock(), left, |state| !state.finishing).unwrap_or_else(PoisonError::into_inner);
+        let (mut state, _) = self
+            .changed
+            .wait_timeout_while(self.lock(), left, |state| !state.finishing)
+            .unwrap_or_else(PoisonError::into_inner);
         loop {
             if let Some(snapshot) = state.waiting.take() {
                 state.counters.taken += 1;

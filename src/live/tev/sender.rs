@@ -60,7 +60,9 @@ impl Sender {
 
     fn connect(&self) -> Option<TcpStream> {
         let addresses = self.options.address.to_socket_addrs().ok()?;
-        let stream = addresses.into_iter().find_map(|address| TcpStream::connect_timeout(&address, self.options.connect_timeout).ok())?;
+        let stream = addresses
+            .into_iter()
+            .find_map(|address| TcpStream::connect_timeout(&address, self.options.connect_timeout).ok())?;
         stream.set_write_timeout(Some(self.options.write_timeout)).ok()?;
         stream.set_nodelay(true).ok()?;
         Some(stream)
@@ -92,7 +94,13 @@ impl Sender {
             // The viewer may have a picture of this name and another shape.
             client.send(PacketCloseImage { image_name: &self.name })?;
             let grab_focus = !self.was_shown;
-            client.send(PacketCreateImage { image_name: &self.name, grab_focus, width, height, channel_names: &names })?;
+            client.send(PacketCreateImage {
+                image_name: &self.name,
+                grab_focus,
+                width,
+                height,
+                channel_names: &names,
+            })?;
             self.was_shown = true;
         }
         let (mut sent, mut unchanged) = (0, 0);
@@ -156,9 +164,9 @@ fn rows(data: &[f32], width: u32, channels: usize, tile: Crop) -> impl Iterator<
 fn is_same(a: &Snapshot, b: &Snapshot, tile: Crop) -> bool {
     let width = a.size()[0];
     let same_row = |(a, b): (&[f32], &[f32])| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
-    a.layers()
-        .zip(b.layers())
-        .all(|((a, names), (b, _))| rows(&a.data, width, names.len(), tile).zip(rows(&b.data, width, names.len(), tile)).all(same_row))
+    a.layers().zip(b.layers()).all(|((a, names), (b, _))| {
+        rows(&a.data, width, names.len(), tile).zip(rows(&b.data, width, names.len(), tile)).all(same_row)
+    })
 }
 
 /// The values of a tile, channel by channel.
@@ -181,7 +189,8 @@ mod tests {
 
     fn snapshot(size: [u32; 2]) -> Snapshot {
         let pixels = (size[0] * size[1]) as usize;
-        let layer = |kind: LayerKind, channels: usize| Layer::new(kind, (0..pixels * channels).map(|i| i as f32).collect());
+        let layer =
+            |kind: LayerKind, channels: usize| Layer::new(kind, (0..pixels * channels).map(|i| i as f32).collect());
         let layers = vec![layer(LayerKind::Color, 4), layer(LayerKind::Z, 1)];
         Snapshot::new(&Image { size, crop: Crop::full(size), layers, ..Image::default() }, 1)
     }

@@ -52,7 +52,9 @@ pub fn color_of_data(file: &ExrFile) -> Vec<Fault> {
         let id = file.text(part, INTEROP_ID)?;
         match contents(file, part) {
             [true, _] if id == DATA => Some("colorInteropID is data, but there is colour".to_owned()),
-            [false, true] if id != DATA && id != "unknown" => Some(format!("colorInteropID is {id}, but there is no colour")),
+            [false, true] if id != DATA && id != "unknown" => {
+                Some(format!("colorInteropID is {id}, but there is no colour"))
+            }
             _ => None,
         }
     })
@@ -92,7 +94,10 @@ pub fn types(file: &ExrFile) -> Vec<Fault> {
             };
             if let Some(value) = wrong {
                 let kind = value.kind_name();
-                faults.push(Fault::part(part, format!("{name} has the type {}, not {expected}", String::from_utf8_lossy(kind))));
+                faults.push(Fault::part(
+                    part,
+                    format!("{name} has the type {}, not {expected}", String::from_utf8_lossy(kind)),
+                ));
             }
         }
     }
@@ -102,7 +107,8 @@ pub fn types(file: &ExrFile) -> Vec<Fault> {
 pub fn capture_date(file: &ExrFile) -> Vec<Fault> {
     let fits = |date: &str| {
         let pattern = "0000:00:00 00:00:00";
-        date.len() == pattern.len() && date.chars().zip(pattern.chars()).all(|(c, p)| if p == '0' { c.is_ascii_digit() } else { c == p })
+        date.len() == pattern.len()
+            && date.chars().zip(pattern.chars()).all(|(c, p)| if p == '0' { c.is_ascii_digit() } else { c == p })
     };
     parts(file, |part| {
         let date = utf8(file.headers[part].own_attributes.capture_date.as_ref()?);

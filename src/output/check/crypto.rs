@@ -35,7 +35,9 @@ pub fn mattes(file: &ExrFile) -> Vec<Matte> {
     for (part, header) in file.headers.iter().enumerate() {
         for (name, value) in &header.own_attributes.other {
             let name = utf8(name);
-            let Some((key, word)) = name.strip_prefix("cryptomatte/").and_then(|rest| rest.split_once('/')) else { continue };
+            let Some((key, word)) = name.strip_prefix("cryptomatte/").and_then(|rest| rest.split_once('/')) else {
+                continue;
+            };
             let exr::meta::attribute::AttributeValue::Text(text) = value else { continue };
             mattes.entry((part, key.to_owned())).or_default().insert(word.to_owned(), utf8(text));
         }
@@ -50,17 +52,20 @@ pub fn distinct(file: &ExrFile) -> Vec<Matte> {
 }
 
 fn each(mattes: Vec<Matte>, what: impl Fn(&Matte) -> Option<String>) -> Vec<Fault> {
-    let fault = |matte: &Matte| what(matte).map(|what| Fault::part(matte.part, format!("cryptomatte/{}: {what}", matte.key)));
+    let fault =
+        |matte: &Matte| what(matte).map(|what| Fault::part(matte.part, format!("cryptomatte/{}: {what}", matte.key)));
     mattes.iter().filter_map(fault).collect()
 }
 
 pub fn described(file: &ExrFile) -> Vec<Fault> {
     let mattes = mattes(file);
     let lacking = each(mattes, |matte| {
-        let lacks: Vec<&str> = ["name", "hash", "conversion"].into_iter().filter(|word| !matte.entries.contains_key(*word)).collect();
+        let lacks: Vec<&str> =
+            ["name", "hash", "conversion"].into_iter().filter(|word| !matte.entries.contains_key(*word)).collect();
         (!lacks.is_empty()).then(|| format!("it lacks {}", lacks.join(" and ")))
     });
-    let described: BTreeSet<String> = distinct(file).iter().filter_map(|matte| matte.name().map(str::to_owned)).collect();
+    let described: BTreeSet<String> =
+        distinct(file).iter().filter_map(|matte| matte.name().map(str::to_owned)).collect();
     let mut passes = BTreeMap::new();
     for channel in file.channels().filter(|channel| channel.role == Role::Crypto) {
         let pass = channel.name.rsplit_once('.').map_or("", |(pass, _)| pass);
@@ -69,7 +74,8 @@ pub fn described(file: &ExrFile) -> Vec<Fault> {
             passes.entry(name.to_owned()).or_insert(channel.part);
         }
     }
-    let undescribed = passes.into_iter().map(|(name, part)| Fault::channel(part, name, "no metadata describes these channels"));
+    let undescribed =
+        passes.into_iter().map(|(name, part)| Fault::channel(part, name, "no metadata describes these channels"));
     lacking.into_iter().chain(undescribed).collect()
 }
 
@@ -86,7 +92,9 @@ pub fn channels(file: &ExrFile) -> Vec<Fault> {
         if let Some(lost) = (0..layers.len()).find(|layer| !layers.contains_key(layer)) {
             return Some(format!("the layer {name}{lost:02} is missing"));
         }
-        let poor = layers.into_iter().find(|(_, suffixes)| !["r", "g", "b", "a"].iter().all(|suffix| suffixes.contains(*suffix)));
+        let poor = layers
+            .into_iter()
+            .find(|(_, suffixes)| !["r", "g", "b", "a"].iter().all(|suffix| suffixes.contains(*suffix)));
         poor.map(|(layer, suffixes)| {
             format!("{name}{layer:02} has only the channels {}", suffixes.into_iter().collect::<Vec<_>>().join(", "))
         })

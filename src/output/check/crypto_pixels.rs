@@ -52,7 +52,9 @@ fn places_of(file: &ExrFile, name: &str) -> Vec<((usize, usize), Place)> {
     for (part, header) in file.headers.iter().enumerate() {
         for (channel, description) in header.channels.list.iter().enumerate() {
             let Some((number, suffix)) = layer_of(name, &description.name.to_string()) else { continue };
-            let Some(component) = ["r", "g", "b", "a"].iter().position(|s| suffix.eq_ignore_ascii_case(s)) else { continue };
+            let Some(component) = ["r", "g", "b", "a"].iter().position(|s| suffix.eq_ignore_ascii_case(s)) else {
+                continue;
+            };
             places.push(((number, component), Place { part, channel }));
         }
     }
@@ -91,7 +93,9 @@ fn each(file: &ExrFile, check: impl Fn(&Ranks) -> Option<Fault>) -> Vec<Fault> {
 
 pub fn ids(file: &ExrFile) -> Vec<Fault> {
     each(file, |ranks| {
-        ranks.fault("ids that are no ordinary floats", |pairs| pairs.iter().any(|&(id, _)| id != 0.0 && !is_ordinary(id.to_bits())))
+        ranks.fault("ids that are no ordinary floats", |pairs| {
+            pairs.iter().any(|&(id, _)| id != 0.0 && !is_ordinary(id.to_bits()))
+        })
     })
 }
 
@@ -117,13 +121,17 @@ pub fn order(file: &ExrFile) -> Vec<Fault> {
 }
 
 pub fn background(file: &ExrFile) -> Vec<Fault> {
-    each(file, |ranks| ranks.fault("coverage of the id 0", |pairs| pairs.iter().any(|&(id, coverage)| id == 0.0 && coverage > 0.0)))
+    each(file, |ranks| {
+        ranks.fault("coverage of the id 0", |pairs| pairs.iter().any(|&(id, coverage)| id == 0.0 && coverage > 0.0))
+    })
 }
 
 pub fn unknown(file: &ExrFile) -> Vec<Fault> {
     each(file, |ranks| {
         let known = ranks.known.as_ref()?;
         let strange = |id: f32| id != 0.0 && is_ordinary(id.to_bits()) && !known.contains(&id.to_bits());
-        ranks.fault("ids that the manifest does not have", |pairs| pairs.iter().any(|&(id, coverage)| coverage > 0.0 && strange(id)))
+        ranks.fault("ids that the manifest does not have", |pairs| {
+            pairs.iter().any(|&(id, coverage)| coverage > 0.0 && strange(id))
+        })
     })
 }

@@ -32,7 +32,9 @@ const OLD_PASSES: &[(&str, &str)] = &[
 
 /// One fault for each channel whose name `what` finds something in.
 fn each(file: &ExrFile, what: impl Fn(&str) -> Option<String>) -> Vec<Fault> {
-    file.channels().filter_map(|channel| what(&channel.name).map(|what| Fault::channel(channel.part, channel.name, what))).collect()
+    file.channels()
+        .filter_map(|channel| what(&channel.name).map(|what| Fault::channel(channel.part, channel.name, what)))
+        .collect()
 }
 
 pub fn dots(file: &ExrFile) -> Vec<Fault> {
@@ -65,7 +67,8 @@ fn collisions(file: &ExrFile, key: impl Fn(usize, &str) -> String) -> Vec<Fault>
     let mut seen: BTreeMap<String, String> = BTreeMap::new();
     let mut faults = Vec::new();
     for channel in file.channels() {
-        let view = file.headers[channel.part].own_attributes.view_name.as_ref().map(ToString::to_string).unwrap_or_default();
+        let view =
+            file.headers[channel.part].own_attributes.view_name.as_ref().map(ToString::to_string).unwrap_or_default();
         let read = key(channel.part, &channel.name);
         match seen.get(&format!("{view}/{read}")) {
             Some(other) => {
@@ -152,7 +155,8 @@ pub fn pass_channels(file: &ExrFile) -> Vec<Fault> {
         ["BGR", "ABGR", "XYZ", "WXYZ", "AUV"].contains(&sorted.concat().as_str())
     };
     let odd = passes(file).into_iter().filter(|(_, suffixes)| matches!(suffixes.len(), 3 | 4) && !known(suffixes));
-    odd.map(|((part, pass), suffixes)| Fault::channel(part, pass, format!("the channels {}", suffixes.join(", ")))).collect()
+    odd.map(|((part, pass), suffixes)| Fault::channel(part, pass, format!("the channels {}", suffixes.join(", "))))
+        .collect()
 }
 
 pub fn depth(file: &ExrFile) -> Vec<Fault> {

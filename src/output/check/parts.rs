@@ -11,7 +11,10 @@ pub fn windows(file: &ExrFile) -> Vec<Fault> {
     for (i, header) in file.headers.iter().enumerate().skip(1) {
         let (own, shared) = (&header.own_attributes, &header.shared_attributes);
         let different = [
-            ("data window", own.layer_position != first.own_attributes.layer_position || header.layer_size != first.layer_size),
+            (
+                "data window",
+                own.layer_position != first.own_attributes.layer_position || header.layer_size != first.layer_size,
+            ),
             ("display window", shared.display_window != first.shared_attributes.display_window),
             ("pixel aspect ratio", shared.pixel_aspect != first.shared_attributes.pixel_aspect),
             ("line order", header.line_order != first.line_order),
@@ -33,7 +36,9 @@ pub fn part_names(file: &ExrFile) -> Vec<Fault> {
     let home = file.channels().find(|channel| !channel.name.contains('.')).map_or(0, |channel| channel.part);
     // A bare Z is the depth of the main layer wherever it stands.
     let bare = |name: &str| !name.contains('.') && name != "Z";
-    let lost = file.channels().filter(|channel| bare(&channel.name) && channel.part != home && view(channel.part) == view(home));
+    let lost = file
+        .channels()
+        .filter(|channel| bare(&channel.name) && channel.part != home && view(channel.part) == view(home));
     let what = |part: usize| {
         let name = file.headers[part].own_attributes.layer_name.as_ref().map(ToString::to_string).unwrap_or_default();
         format!("a bare name in the part \"{name}\", while other channels have dots")
@@ -56,7 +61,9 @@ pub fn metadata(file: &ExrFile) -> Vec<Fault> {
 }
 
 pub fn scanline_compression(file: &ExrFile) -> Vec<Fault> {
-    let slow = |compression: Compression| !matches!(compression, Compression::ZIP1 | Compression::RLE | Compression::Uncompressed);
+    let slow = |compression: Compression| {
+        !matches!(compression, Compression::ZIP1 | Compression::RLE | Compression::Uncompressed)
+    };
     let parts = file.headers.iter().enumerate().filter(|(_, header)| slow(header.compression));
     parts.map(|(i, header)| Fault::part(i, format!("the compression is {}", header.compression))).collect()
 }

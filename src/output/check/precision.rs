@@ -8,7 +8,9 @@ use super::file::{Channel, ExrFile};
 use crate::output::role::Role;
 
 fn each(file: &ExrFile, what: impl Fn(&Channel) -> Option<String>) -> Vec<Fault> {
-    file.channels().filter_map(|channel| what(&channel).map(|what| Fault::channel(channel.part, channel.name, what))).collect()
+    file.channels()
+        .filter_map(|channel| what(&channel).map(|what| Fault::channel(channel.part, channel.name, what)))
+        .collect()
 }
 
 pub fn half_data(file: &ExrFile) -> Vec<Fault> {
@@ -41,7 +43,9 @@ pub fn dwa(file: &ExrFile) -> Vec<Fault> {
         let old = ["r", "g", "b", "y"].contains(&suffix);
         Some(match (exact, old) {
             (true, _) => format!("{} rounds it, since its name ends with {suffix}", c.header.compression),
-            (_, true) => format!("{} of older programs rounds it, since its name ends with {suffix}", c.header.compression),
+            (_, true) => {
+                format!("{} of older programs rounds it, since its name ends with {suffix}", c.header.compression)
+            }
             _ => format!("it lies in a part compressed with {}", c.header.compression),
         })
     })
@@ -57,6 +61,7 @@ pub fn pxr24(file: &ExrFile) -> Vec<Fault> {
 pub fn b44(file: &ExrFile) -> Vec<Fault> {
     each(file, |c| {
         let lossy = matches!(c.header.compression, Compression::B44 | Compression::B44A);
-        (lossy && c.sample_type == SampleType::F16 && c.role.is_data()).then(|| "rounded in blocks of four by four".to_owned())
+        (lossy && c.sample_type == SampleType::F16 && c.role.is_data())
+            .then(|| "rounded in blocks of four by four".to_owned())
     })
 }

@@ -21,7 +21,8 @@ pub const RULES: &[Rule] = &[
         id: "nuke-dots",
         title: "A channel's name has at most one dot",
         source: "Nuke: EXR reader",
-        effect: "Nuke joins all but the last of three pieces to the layer and keeps the rest as the channel: layer a_b, channel key_R",
+        effect: "Nuke joins all but the last of three pieces to the layer and keeps the rest as the channel: layer \
+                 a_b, channel key_R",
         mend: "name channels layer.channel, with underscores inside the layer",
         severity: NUKE,
         check: names::dots,
@@ -75,7 +76,8 @@ pub const RULES: &[Rule] = &[
         id: "nuke-part-names",
         title: "If any name has a dot, only one part has bare names (and Z)",
         source: "Nuke: multi-part files",
-        effect: "Nuke ignores the names of parts as soon as one channel has a dot: bare channels of several parts fall together",
+        effect: "Nuke ignores the names of parts as soon as one channel has a dot: bare channels of several parts fall \
+                 together",
         mend: "write layer.channel in every part",
         severity: NUKE,
         check: parts::part_names,
@@ -201,7 +203,8 @@ pub const RULES: &[Rule] = &[
         id: "dwa-data",
         title: "No part that holds data is compressed with dwaa or dwab",
         source: "OpenEXR: DWA channel rules",
-        effect: "channels that end with R, G, B, Y, BY or RY are rounded, in older programs r, g and b too: y-components and ids are destroyed",
+        effect: "channels that end with R, G, B, Y, BY or RY are rounded, in older programs r, g and b too: \
+                 y-components and ids are destroyed",
         mend: "compress data with zip, or put it into a part of its own",
         severity: ERROR,
         check: precision::dwa,

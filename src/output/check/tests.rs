@@ -3,8 +3,8 @@ use super::*;
 use exr::compression::Compression;
 use exr::meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, Text};
 use exr::prelude::{
-    AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Image, ImageAttributes, Layer, LayerAttributes, Layers, LineOrder, Vec2,
-    WritableImage, f16,
+    AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Image, ImageAttributes, Layer, LayerAttributes, Layers,
+    LineOrder, Vec2, WritableImage, f16,
 };
 
 use crate::output::cryptomatte::id_bits;
@@ -44,7 +44,9 @@ impl DraftPart {
     }
 
     fn text(mut self, name: &str, value: &str) -> Self {
-        self.attributes.other.insert(Text::from(name), AttributeValue::Text(Text::from_bytes_unchecked(value.bytes().collect())));
+        self.attributes
+            .other
+            .insert(Text::from(name), AttributeValue::Text(Text::from_bytes_unchecked(value.bytes().collect())));
         self
     }
 
@@ -136,8 +138,10 @@ impl Draft {
 }
 
 fn layer(part: &DraftPart) -> Layer<AnyChannels<FlatSamples>> {
-    let channels = part.channels.iter().map(|(name, samples)| AnyChannel::new(name.as_str(), samples.clone())).collect();
-    let encoding = Encoding { compression: part.compression, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
+    let channels =
+        part.channels.iter().map(|(name, samples)| AnyChannel::new(name.as_str(), samples.clone())).collect();
+    let encoding =
+        Encoding { compression: part.compression, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
     Layer::new(Vec2(2, 1), part.attributes.clone(), encoding, AnyChannels::sort(channels))
 }
 
@@ -185,7 +189,9 @@ fn example(rule: &str) -> Draft {
         "b44-data" => one(DraftPart::new("R:h G:h B:h N.X:h N.Y:h N.Z:h").compressed(Compression::B44)),
         "windows-apart" => Draft { display: window(10), ..one(rgb()) },
         "color-unknown" => Draft { chromaticities: None, ..one(rgb()) },
-        "color-contradiction" => Draft { chromaticities: Some(COLOR_SPACES[1].1), ..one(rgb().text("colorInteropID", "lin_rec709_scene")) },
+        "color-contradiction" => {
+            Draft { chromaticities: Some(COLOR_SPACES[1].1), ..one(rgb().text("colorInteropID", "lin_rec709_scene")) }
+        }
         "color-id" => one(rgb().text("colorInteropID", "lin_rec709")),
         "color-of-data" => one(rgb().text("colorInteropID", "data")),
         "attribute-type" => one(rgb().value("owner", AttributeValue::F32(1.0))),
@@ -203,17 +209,24 @@ fn example(rule: &str) -> Draft {
         }
         "crypto-suffixes" => {
             let mut part = good_matte();
-            part.channels.iter_mut().skip(3).for_each(|(name, _)| *name = format!("CryptoObject00.{}", name[15..].to_uppercase()));
+            part.channels
+                .iter_mut()
+                .skip(3)
+                .for_each(|(name, _)| *name = format!("CryptoObject00.{}", name[15..].to_uppercase()));
             one(part)
         }
         "crypto-key" => {
             let part = matte([torus(), 1.0, 0.0, 0.0], &[]);
-            one(DESCRIPTION.iter().fold(part, |part, (word, value)| part.text(&format!("cryptomatte/0000001/{word}"), value)))
+            one(DESCRIPTION
+                .iter()
+                .fold(part, |part, (word, value)| part.text(&format!("cryptomatte/0000001/{word}"), value)))
         }
         "crypto-method" => described_as("hash", Some("SHA1")),
         "crypto-manifest" => described_as("manifest", None),
         "crypto-manifest-form" => described_as("manifest", Some(r#"["torus"]"#)),
-        "crypto-manifest-ids" => described_as("manifest", Some(r#"{"torus":"f19c73fd","bunny":"13851a76","obj520":"7fbb01ed"}"#)),
+        "crypto-manifest-ids" => {
+            described_as("manifest", Some(r#"{"torus":"f19c73fd","bunny":"13851a76","obj520":"7fbb01ed"}"#))
+        }
         "crypto-sidecar-path" => described_as("manif_file", Some("../names.json")),
         "crypto-sidecar" => {
             let part = described("manifest", None);
@@ -240,8 +253,15 @@ fn every_rule_has_a_file_that_breaks_it() {
         for (profile, name) in ExrProfileDesc::ALL {
             let findings = example(rule.id).findings(profile);
             let found = findings.iter().find(|finding| finding.rule == rule.id);
-            assert_eq!(found.map(|finding| finding.severity), rule.severity(profile), "{} in {name}: {findings:#?}", rule.id);
-            assert!(found.is_none_or(|finding| !finding.what.is_empty() && !finding.effect.is_empty() && !finding.mend.is_empty()));
+            assert_eq!(
+                found.map(|finding| finding.severity),
+                rule.severity(profile),
+                "{} in {name}: {findings:#?}",
+                rule.id
+            );
+            assert!(found.is_none_or(|finding| !finding.what.is_empty()
+                && !finding.effect.is_empty()
+                && !finding.mend.is_empty()));
         }
     }
 }
@@ -253,7 +273,12 @@ fn good_files_are_clean() {
         one(DraftPart::new("R:h G:h B:h A:h albedo.R:h albedo.G:h albedo.B:h Z")),
         one(DraftPart::new("Y:h")),
         one(good_matte()),
-        several([DraftPart::new("R:h G:h B:h").compressed(Compression::DWAA(None)).text("colorInteropID", "lin_rec709_scene"), data]),
+        several([
+            DraftPart::new("R:h G:h B:h")
+                .compressed(Compression::DWAA(None))
+                .text("colorInteropID", "lin_rec709_scene"),
+            data,
+        ]),
         one(placed(ndc(0.5, -0.5, 0.5))),
         one(DraftPart::new("R:h G:h B:h").set(|a| a.capture_date = Some(Text::from("2026:11:22 06:00:00")))),
     ];
@@ -261,7 +286,8 @@ fn good_files_are_clean() {
         assert_eq!(draft.findings(ExrProfileDesc::Default), []);
     }
     assert_eq!(
-        one(DraftPart::new("R:h G:h B:h Diffuse_Direct.R:h Diffuse_Direct.G:h Diffuse_Direct.B:h")).findings(ExrProfileDesc::Blender),
+        one(DraftPart::new("R:h G:h B:h Diffuse_Direct.R:h Diffuse_Direct.G:h Diffuse_Direct.B:h"))
+            .findings(ExrProfileDesc::Blender),
         []
     );
 }
@@ -296,9 +322,11 @@ fn faults_of_reading_have_their_kinds() {
 fn the_manual_lists_every_rule() {
     let manual = include_str!("../../../docs/exr.md");
     let cell = |severity: Option<Severity>| severity.map_or("-", Severity::name);
-    let mut rows: Vec<&str> = manual.lines().filter(|line| line.starts_with("| `") && line.matches('|').count() == 8).collect();
+    let mut rows: Vec<&str> =
+        manual.lines().filter(|line| line.starts_with("| `") && line.matches('|').count() == 8).collect();
     for rule in RULES {
-        let severities: Vec<&str> = ExrProfileDesc::ALL.iter().map(|(profile, _)| cell(rule.severity(*profile))).collect();
+        let severities: Vec<&str> =
+            ExrProfileDesc::ALL.iter().map(|(profile, _)| cell(rule.severity(*profile))).collect();
         let row = format!("| `{}` | {} | {} | {} |", rule.id, rule.title, rule.source, severities.join(" | "));
         assert!(rows.contains(&row.as_str()), "docs/exr.md lacks\n{row}");
         rows.retain(|other| *other != row);

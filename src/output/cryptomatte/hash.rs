@@ -78,7 +78,12 @@ mod tests {
             let id = id(&format!("object {i}"));
             assert!(id.is_normal(), "{i}");
         }
-        assert!(!is_ordinary(0) && !is_ordinary(1) && !is_ordinary(f32::INFINITY.to_bits()) && !is_ordinary(f32::NAN.to_bits()));
+        assert!(
+            !is_ordinary(0)
+                && !is_ordinary(1)
+                && !is_ordinary(f32::INFINITY.to_bits())
+                && !is_ordinary(f32::NAN.to_bits())
+        );
     }
 
     #[test]

@@ -17,7 +17,8 @@ pub fn manifest<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
 /// What is wrong with the text: it is not JSON, not an object, or an id has not eight hexadecimal digits of an ordinary
 /// float.
 pub fn parse_manifest(text: &str) -> Result<BTreeMap<String, u32>, String> {
-    let entries: BTreeMap<String, serde_json::Value> = serde_json::from_str(text).map_err(|e| format!("it is no JSON object: {e}"))?;
+    let entries: BTreeMap<String, serde_json::Value> =
+        serde_json::from_str(text).map_err(|e| format!("it is no JSON object: {e}"))?;
     entries
         .into_iter()
         .map(|(name, value)| {
@@ -25,7 +26,9 @@ pub fn parse_manifest(text: &str) -> Result<BTreeMap<String, u32>, String> {
             let bits = digits.and_then(|digits| u32::from_str_radix(digits, 16).ok());
             match bits {
                 Some(bits) => Ok((name, bits)),
-                None => Err(format!("the id of \"{name}\" is {value}, which is not a string of eight hexadecimal digits")),
+                None => {
+                    Err(format!("the id of \"{name}\" is {value}, which is not a string of eight hexadecimal digits"))
+                }
             }
         })
         .collect()

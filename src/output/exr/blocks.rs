@@ -34,11 +34,17 @@ const LEVEL: i32 = 1;
 pub fn write_image(image: &FlatImage, out: &mut BufWriter<&mut File>) -> Result<(), String> {
     let headers = image.layer_data.infer_headers(&image.attributes);
     let layers = image.layer_data.create_writer(&headers);
-    exr::block::write(&mut *out, headers, true, |meta, chunks| write_blocks(&meta, image, &layers, chunks)).map_err(|e| e.to_string())?;
+    exr::block::write(&mut *out, headers, true, |meta, chunks| write_blocks(&meta, image, &layers, chunks))
+        .map_err(|e| e.to_string())?;
     out.flush().and_then(|()| finish_headers(out.get_mut())).map_err(|e| e.to_string())
 }
 
-fn write_blocks(meta: &MetaData, image: &FlatImage, layers: &impl LayersWriter, chunks: &mut (impl ChunksWriter + Send)) -> UnitResult {
+fn write_blocks(
+    meta: &MetaData,
+    image: &FlatImage,
+    layers: &impl LayersWriter,
+    chunks: &mut (impl ChunksWriter + Send),
+) -> UnitResult {
     let ordered = Mutex::new(Ordered { chunks, next: 0, waiting: BTreeMap::new() });
     let blocks = enumerate_ordered_header_block_indices(&meta.headers).enumerate();
     // Threads take blocks in order, so that few wait for those before them.
@@ -88,7 +94,8 @@ fn chunk(header: &Header, index: BlockIndex, compressed_pixels_le: Vec<u8>) -> E
             CompressedBlock::ScanLine(CompressedScanLineBlock { y_coordinate: y, compressed_pixels_le })
         }
         BlockDescription::Tiles(tiles) => {
-            let coordinates = TileCoordinates { tile_index: index.pixel_position / tiles.tile_size, level_index: index.level };
+            let coordinates =
+                TileCoordinates { tile_index: index.pixel_position / tiles.tile_size, level_index: index.level };
             CompressedBlock::Tile(CompressedTileBlock { coordinates, compressed_pixels_le })
         }
     };
@@ -116,7 +123,8 @@ impl Zip {
         let (corner, size) = (index.pixel_position, index.pixel_size);
         let channels = &part.channel_data.list;
         let pairs: usize =
-            channels.iter().map(|channel| channel.sample_data.sample_type().bytes_per_sample() / 2).sum::<usize>() * size.area();
+            channels.iter().map(|channel| channel.sample_data.sample_type().bytes_per_sample() / 2).sum::<usize>()
+                * size.area();
         self.predicted.resize(2 * pairs, 0);
         let (firsts, seconds) = self.predicted.split_at_mut(pairs);
         // Nothing is before the first byte of all.
@@ -179,8 +187,8 @@ fn subtract_pairs(bytes: &[u8], firsts: &mut [u8], seconds: &mut [u8]) {
 #[cfg(test)]
 mod tests {
     use exr::prelude::{
-        AnyChannel, Blocks, Encoding, Image, ImageAttributes, IntegerBounds, LayerAttributes, LineOrder, ReadChannels, ReadLayers,
-        SmallVec, Vec2, read,
+        AnyChannel, Blocks, Encoding, Image, ImageAttributes, IntegerBounds, LayerAttributes, LineOrder, ReadChannels,
+        ReadLayers, SmallVec, Vec2, read,
     };
 
     use super::*;
@@ -232,7 +240,10 @@ mod tests {
                     let image = picture(size, compression, blocks);
                     let (read, _) = written(&image);
                     assert!(bits(&read) == bits(&image), "{size:?} {compression} {blocks:?}");
-                    assert_eq!((read.layer_data[1].size, read.layer_data[1].encoding), (size, image.layer_data[1].encoding));
+                    assert_eq!(
+                        (read.layer_data[1].size, read.layer_data[1].encoding),
+                        (size, image.layer_data[1].encoding)
+                    );
                     assert_eq!(read.layer_data[1].attributes.layer_position, Vec2(-3, 5));
                 }
             }

@@ -67,7 +67,8 @@ pub fn numbers(kind: LayerKind, coverage: &Coverage, identities: &Identities) ->
         first.and_then(|(key, _)| numbers.get(key)).map_or(0.0, |number| *number as f32)
     };
     let data = (0..coverage.pixels()).into_par_iter().map(of_pixel).collect();
-    let seen: BTreeMap<&str, u32> = names.iter().map(|(key, name)| (name.as_str(), numbers[key])).filter(|(_, n)| *n > 0).collect();
+    let seen: BTreeMap<&str, u32> =
+        names.iter().map(|(key, name)| (name.as_str(), numbers[key])).filter(|(_, n)| *n > 0).collect();
     Some(Numbers { data, names: serde_json::to_string(&seen).unwrap_or_default() })
 }
 

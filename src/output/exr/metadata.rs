@@ -44,7 +44,9 @@ pub fn sidecar_path(file: &Path, type_name: &str) -> PathBuf {
 impl Mattes<'_> {
     /// The name of the file with a matte's names, beside the picture.
     pub fn sidecar(&self, matte: &Matte) -> String {
-        sidecar_path(self.file, matte.name).file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+        sidecar_path(self.file, matte.name)
+            .file_name()
+            .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
     }
 
     fn describe(&self, attributes: &mut LayerAttributes) {
@@ -147,6 +149,9 @@ mod tests {
 
     #[test]
     fn frame_rates_are_those_of_film_and_television() {
-        assert_eq!([24.0, 23.976, 29.97, 59.94, 12.5].map(rational), [(24, 1), (24000, 1001), (30000, 1001), (60000, 1001), (12500, 1000)]);
+        assert_eq!(
+            [24.0, 23.976, 29.97, 59.94, 12.5].map(rational),
+            [(24, 1), (24000, 1001), (30000, 1001), (60000, 1001), (12500, 1000)]
+        );
     }
 }

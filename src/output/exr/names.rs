@@ -58,12 +58,13 @@ pub fn motion_channels(profile: ExrProfileDesc) -> Option<(&'static [&'static st
     match profile {
         ExrProfileDesc::Nuke => Some((
             &["forward.u", "forward.v"],
-            "forward: motion of the nearest sample while the shutter is open, in pixels to the right and up; for VectorBlur with a shutter of 1",
+            "forward: motion of the nearest sample while the shutter is open, in pixels to the right and up; for \
+             VectorBlur with a shutter of 1",
         )),
         ExrProfileDesc::Blender => Some((
             &["Vector.X", "Vector.Y", "Vector.Z", "Vector.W"],
-            "Vector: motion of the nearest sample in pixels to the right and up, from the middle of the shutter interval to its begin (X, Y) and to \
-             its end (Z, W); for Vector Blur with a shutter of 1",
+            "Vector: motion of the nearest sample in pixels to the right and up, from the middle of the shutter \
+             interval to its begin (X, Y) and to its end (Z, W); for Vector Blur with a shutter of 1",
         )),
         ExrProfileDesc::Default | ExrProfileDesc::Multipart => None,
     }
@@ -75,7 +76,18 @@ mod tests {
 
     #[test]
     fn blender_gets_the_names_of_its_passes() {
-        let names = ["R", "A", "Z", "N.X", "specular_indirect.G", "light_key.R", "object_id.id", "CryptoObject00.r", "variance.R", "uv.U"];
+        let names = [
+            "R",
+            "A",
+            "Z",
+            "N.X",
+            "specular_indirect.G",
+            "light_key.R",
+            "object_id.id",
+            "CryptoObject00.r",
+            "variance.R",
+            "uv.U",
+        ];
         let passes = [
             "R",
             "A",

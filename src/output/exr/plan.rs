@@ -25,7 +25,8 @@ pub enum PartKind {
 
 impl PartKind {
     /// All parts, in the order of files.
-    pub const ALL: [(Self, &'static str); 3] = [(Self::Beauty, "beauty"), (Self::Utility, "utility"), (Self::Crypto, "crypto")];
+    pub const ALL: [(Self, &'static str); 3] =
+        [(Self::Beauty, "beauty"), (Self::Utility, "utility"), (Self::Crypto, "crypto")];
 
     /// The part that a channel goes to.
     pub fn of(role: Role) -> Self {
@@ -65,14 +66,20 @@ pub fn find_output_fault(output: &OutputDesc) -> Option<OutputFault> {
     {
         let (compression, layer) = (compression_name(compression), layer_name(*layer));
         let message = format!(
-            "the compression {compression} would spoil the layer {layer}, which holds data; the profile multipart gives data a part of its own"
+            "the compression {compression} would spoil the layer {layer}, which holds data; the profile multipart \
+             gives data a part of its own"
         );
         return fault("compression", message);
     }
-    let spoiled =
-        output.pixel_types.iter().find(|(layer, pixel_type)| **pixel_type == PixelTypeDesc::Half && LayerInfo::of(**layer).always_float);
+    let spoiled = output
+        .pixel_types
+        .iter()
+        .find(|(layer, pixel_type)| **pixel_type == PixelTypeDesc::Half && LayerInfo::of(**layer).always_float);
     if let Some((layer, _)) = spoiled {
-        return fault("pixel_types", format!("the layer {} needs 32 bits: its pixel type cannot be half", layer_name(*layer)));
+        return fault(
+            "pixel_types",
+            format!("the layer {} needs 32 bits: its pixel type cannot be half", layer_name(*layer)),
+        );
     }
     if let Some(depth) = output.crypto_depth.filter(|depth| *depth == 0 || depth % 2 == 1 || *depth > MAX_DEPTH) {
         return fault("crypto_depth", format!("{depth} ranks of Cryptomatte: an even number from 2 to {MAX_DEPTH}"));
@@ -87,7 +94,9 @@ pub fn find_output_fault(output: &OutputDesc) -> Option<OutputFault> {
         _ => {}
     }
     match output.frames_per_second {
-        Some(fps) if !(fps > 0.0 && fps <= 1e6) => fault("frames_per_second", format!("{fps} frames per second: a number above 0")),
+        Some(fps) if !(fps > 0.0 && fps <= 1e6) => {
+            fault("frames_per_second", format!("{fps} frames per second: a number above 0"))
+        }
         _ => None,
     }
 }

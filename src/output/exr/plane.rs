@@ -56,7 +56,8 @@ impl Region {
 
 /// The channels of all sources, in parallel. Numbers beyond what 16 bits hold become their largest, 65504.
 pub fn planes(sources: &[SampleSource], region: Region) -> Vec<Plane> {
-    let jobs: Vec<(&SampleSource, usize)> = sources.iter().flat_map(|source| (0..source.names.len()).map(move |i| (source, i))).collect();
+    let jobs: Vec<(&SampleSource, usize)> =
+        sources.iter().flat_map(|source| (0..source.names.len()).map(move |i| (source, i))).collect();
     jobs.into_par_iter()
         .map(|(source, i)| {
             let name = source.names[i].clone();

@@ -28,14 +28,19 @@ pub fn read_exr(path: &Path) -> Result<Image> {
     let malformed = |message: String| Error::Malformed { file: path.to_owned(), message };
     let headers = read_headers(path).map_err(malformed)?;
     let flat = headers.iter().enumerate().filter(|(_, header)| !header.deep);
-    let Some((part, choice)) = flat.filter_map(|(part, header)| Some((part, choose_channels(&header.channels.list)?))).next() else {
+    let Some((part, choice)) =
+        flat.filter_map(|(part, header)| Some((part, choose_channels(&header.channels.list)?))).next()
+    else {
         let deep = if headers.iter().any(|header| header.deep) { " (deep data is unsupported)" } else { "" };
-        let names: Vec<String> = headers.iter().flat_map(|header| &header.channels.list).map(|c| c.name.to_string()).collect();
+        let names: Vec<String> =
+            headers.iter().flat_map(|header| &header.channels.list).map(|c| c.name.to_string()).collect();
         return Err(malformed(format!("there are no channels R, G and B and no Y{deep}; it has {}", names.join(", "))));
     };
     let header = &headers[part];
     let (mut requested, mut components) = (Vec::new(), Vec::new());
-    for (component, channel) in choice.into_iter().enumerate().filter_map(|(component, channel)| Some((component, channel?))) {
+    for (component, channel) in
+        choice.into_iter().enumerate().filter_map(|(component, channel)| Some((component, channel?)))
+    {
         let channel_header = &header.channels.list[channel];
         if channel_header.sampling != Vec2(1, 1) {
             return Err(malformed(format!("channel {} is subsampled", channel_header.name)));
@@ -44,9 +49,11 @@ pub fn read_exr(path: &Path) -> Result<Image> {
         components.push(component);
     }
     let mut data = allocate(path, header, 4, 1.0)?;
-    let keep = |row: ChannelRow| row.write(data[4 * row.start + components[row.requested]..].iter_mut().step_by(4), |v| v);
+    let keep =
+        |row: ChannelRow| row.write(data[4 * row.start + components[row.requested]..].iter_mut().step_by(4), |v| v);
     read_rows(BufReader::new(source), &headers, &requested, false, keep).map_err(|e| malformed(e.to_string()))?;
-    let (size, crop) = windows(&header.shared_attributes.display_window, header.own_attributes.layer_position, header.layer_size);
+    let (size, crop) =
+        windows(&header.shared_attributes.display_window, header.own_attributes.layer_position, header.layer_size);
     Ok(Image { size, crop, layers: vec![Layer::new(LayerKind::Color, data)], ..Image::default() })
 }
 

@@ -6,7 +6,8 @@ use std::process::Command;
 
 use exr::meta::attribute::IntegerBounds;
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatImage, FlatSamples, LayerAttributes, ReadChannels, ReadLayers, Vec2, WritableImage, read,
+    AnyChannel, AnyChannels, Encoding, FlatImage, FlatSamples, LayerAttributes, ReadChannels, ReadLayers, Vec2,
+    WritableImage, read,
 };
 
 use crate::desc::{CompressionDesc, ExrProfileDesc, LayerKind, OutputDesc, PixelTypeDesc};
@@ -14,11 +15,19 @@ use crate::error::Error;
 use crate::film::{Coverage, Crop, Identities, Image, Label, Layer, LayerInfo, ShapeIdentity, ShapeKey};
 use crate::output::{RenderInfo, check_exr, cryptomatte};
 
-const LAYERS: [LayerKind; 6] = [LayerKind::Z, LayerKind::N, LayerKind::P, LayerKind::Albedo, LayerKind::Variance, LayerKind::Samples];
+const LAYERS: [LayerKind; 6] =
+    [LayerKind::Z, LayerKind::N, LayerKind::P, LayerKind::Albedo, LayerKind::Variance, LayerKind::Samples];
 
 /// The layers of the pictures below.
-const LAYERS_OF_PICTURE: [LayerKind; 7] =
-    [LayerKind::Color, LayerKind::Z, LayerKind::N, LayerKind::P, LayerKind::Albedo, LayerKind::Variance, LayerKind::Samples];
+const LAYERS_OF_PICTURE: [LayerKind; 7] = [
+    LayerKind::Color,
+    LayerKind::Z,
+    LayerKind::N,
+    LayerKind::P,
+    LayerKind::Albedo,
+    LayerKind::Variance,
+    LayerKind::Samples,
+];
 
 /// A cropped picture of several layers with numbers that 16 bits hold, save where a layer is always of 32.
 fn picture() -> Image {
@@ -28,22 +37,45 @@ fn picture() -> Image {
         let scale = if info.always_float { std::f32::consts::PI } else { 1.0 / 64.0 };
         Layer::new(info.kind, (0..values).map(|i| ((i * 37) % 1999) as f32 * scale - 3.0).collect())
     };
-    Image { size: [40, 30], crop, layers: LAYERS_OF_PICTURE.iter().map(|kind| layer(LayerInfo::of(*kind))).collect(), ..Image::default() }
+    Image {
+        size: [40, 30],
+        crop,
+        layers: LAYERS_OF_PICTURE.iter().map(|kind| layer(LayerInfo::of(*kind))).collect(),
+        ..Image::default()
+    }
 }
 
 fn info() -> RenderInfo {
-    let world_to_camera = Some([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.5, 2.5, 3.5, 1.0]]);
-    RenderInfo { samples_per_pixel: 64, render_seconds: 1.5, world_to_camera, pixel_aspect: Some(2.0), ..RenderInfo::default() }
+    let world_to_camera =
+        Some([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.5, 2.5, 3.5, 1.0]]);
+    RenderInfo {
+        samples_per_pixel: 64,
+        render_seconds: 1.5,
+        world_to_camera,
+        pixel_aspect: Some(2.0),
+        ..RenderInfo::default()
+    }
 }
 
 fn output(path: &Path, pixel_type: PixelTypeDesc, compression: CompressionDesc) -> OutputDesc {
-    OutputDesc { layers: LAYERS.to_vec(), pixel_type, compression: Some(compression), ..OutputDesc::new(path.display().to_string()) }
+    OutputDesc {
+        layers: LAYERS.to_vec(),
+        pixel_type,
+        compression: Some(compression),
+        ..OutputDesc::new(path.display().to_string())
+    }
 }
 
 /// All channels of a file through the library, by name.
 fn all_channels(path: &Path) -> Vec<(String, FlatSamples)> {
-    let file: FlatImage =
-        read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes().from_file(path).unwrap();
+    let file: FlatImage = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .from_file(path)
+        .unwrap();
     assert_eq!(file.layer_data.len(), 1);
     file.layer_data[0].channel_data.list.iter().map(|c| (c.name.to_string(), c.sample_data.clone())).collect()
 }
@@ -63,7 +95,8 @@ fn files_come_back_exactly() {
             let read = read_exr(&path).unwrap();
             assert_eq!((read.size, read.crop), (image.size, image.crop));
             for (read, written) in read.layers[0].data.iter().zip(&image.layers[0].data) {
-                let expected = if pixel_type == PixelTypeDesc::Half { to_half(vec![*written])[0].to_f32() } else { *written };
+                let expected =
+                    if pixel_type == PixelTypeDesc::Half { to_half(vec![*written])[0].to_f32() } else { *written };
                 assert!(read.is_finite() && *read == expected, "{read} {written}");
             }
             let channels = all_channels(&path);
@@ -72,7 +105,10 @@ fn files_come_back_exactly() {
                 for (i, name) in LayerInfo::of(layer.kind).channels.iter().enumerate() {
                     let samples = &channels.iter().find(|(n, _)| n == name).unwrap().1;
                     assert!(samples.values_as_f32().eq(layer.channel(i)), "{name}");
-                    assert!(!LayerInfo::of(layer.kind).always_float || matches!(samples, FlatSamples::F32(_)), "{name}");
+                    assert!(
+                        !LayerInfo::of(layer.kind).always_float || matches!(samples, FlatSamples::F32(_)),
+                        "{name}"
+                    );
                 }
             }
         }
@@ -131,17 +167,25 @@ fn layers_gray_pictures_and_overscan_are_read() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
     let write = |names: &[&str], position: Vec2<i32>| {
-        let channels = names.iter().enumerate().map(|(i, name)| AnyChannel::new(*name, FlatSamples::F32(vec![i as f32; 6]))).collect();
+        let channels = names
+            .iter()
+            .enumerate()
+            .map(|(i, name)| AnyChannel::new(*name, FlatSamples::F32(vec![i as f32; 6])))
+            .collect();
         let attributes = LayerAttributes { layer_position: position, ..LayerAttributes::default() };
-        let layer = exr::prelude::Layer::new(Vec2(3, 2), attributes, Encoding::UNCOMPRESSED, AnyChannels::sort(channels));
+        let layer =
+            exr::prelude::Layer::new(Vec2(3, 2), attributes, Encoding::UNCOMPRESSED, AnyChannels::sort(channels));
         let mut file = exr::prelude::Image::from_layer(layer);
         file.attributes.display_window = IntegerBounds::new(Vec2(0, 0), Vec2(8, 8));
         file.write().to_file(&path).unwrap();
         read_exr(&path)
     };
     let first = |image: &Image| image.layers[0].data[..4].to_vec();
-    let layered =
-        write(&["albedo.R", "albedo.G", "albedo.B", "View.Combined.R", "View.Combined.G", "View.Combined.B"], Vec2(1, 1)).unwrap();
+    let layered = write(
+        &["albedo.R", "albedo.G", "albedo.B", "View.Combined.R", "View.Combined.G", "View.Combined.B"],
+        Vec2(1, 1),
+    )
+    .unwrap();
     assert_eq!(first(&layered), [3.0, 4.0, 5.0, 1.0]);
     assert_eq!((layered.size, layered.crop), ([8, 8], Crop { x: 1, y: 1, width: 3, height: 2 }));
     assert_eq!(first(&write(&["A", "Y", "x.R"], Vec2(0, 0)).unwrap()), [1.0, 1.0, 1.0, 0.0]);
@@ -202,8 +246,13 @@ fn full_picture() -> Image {
     let mut layers = Vec::new();
     for info in LayerInfo::ALL.iter().filter(|info| !matches!(info.source, crate::film::LayerSource::Coverage)) {
         let data: Vec<f32> = (0..pixels * info.channels.len()).map(|i| (i % 101) as f32 / 64.0).collect();
-        let groups: &[Option<&str>] = if info.kind == LayerKind::LightGroups { &[Some("key light"), Some("default")] } else { &[None] };
-        layers.extend(groups.iter().map(|group| Layer { kind: info.kind, group: group.map(str::to_owned), data: data.clone() }));
+        let groups: &[Option<&str>] =
+            if info.kind == LayerKind::LightGroups { &[Some("key light"), Some("default")] } else { &[None] };
+        layers.extend(groups.iter().map(|group| Layer {
+            kind: info.kind,
+            group: group.map(str::to_owned),
+            data: data.clone(),
+        }));
     }
     let mut coverage = Coverage::default();
     std::iter::repeat_n(weights, pixels).for_each(|weights| coverage.push(weights));
@@ -226,14 +275,25 @@ fn files_of_every_profile_are_clean() {
     assert!(every_layer().len() >= 24);
     for (profile, name) in ExrProfileDesc::ALL {
         for compression in [Zip, Zips, Piz, Rle, None, Dwaa, Dwab] {
-            let compression = Some(compression).filter(|c| profile == ExrProfileDesc::Multipart || ![Dwaa, Dwab].contains(c));
+            let compression =
+                Some(compression).filter(|c| profile == ExrProfileDesc::Multipart || ![Dwaa, Dwab].contains(c));
             for (uncropped, manifest) in
                 [(false, crate::desc::CryptoManifestDesc::Embedded), (true, crate::desc::CryptoManifestDesc::Sidecar)]
             {
-                let compression =
-                    if profile == ExrProfileDesc::Nuke { compression.filter(|c| *c != Zip && *c != Piz) } else { compression };
+                let compression = if profile == ExrProfileDesc::Nuke {
+                    compression.filter(|c| *c != Zip && *c != Piz)
+                } else {
+                    compression
+                };
                 let layers = every_layer();
-                let output = OutputDesc { profile, compression, layers, uncropped, crypto_manifest: manifest, ..OutputDesc::new("a.exr") };
+                let output = OutputDesc {
+                    profile,
+                    compression,
+                    layers,
+                    uncropped,
+                    crypto_manifest: manifest,
+                    ..OutputDesc::new("a.exr")
+                };
                 write_exr(&path, &image, &output, &info).unwrap();
                 assert_eq!(check_exr(&path, profile).unwrap(), [], "{name} {compression:?}");
             }
@@ -243,10 +303,20 @@ fn files_of_every_profile_are_clean() {
 
 /// Channels of all parts by name.
 fn channels_of_parts(path: &Path) -> Vec<(usize, String, FlatSamples)> {
-    let file: FlatImage =
-        read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes().from_file(path).unwrap();
+    let file: FlatImage = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .from_file(path)
+        .unwrap();
     let parts = file.layer_data.into_iter().enumerate();
-    parts.flat_map(|(part, layer)| layer.channel_data.list.into_iter().map(move |c| (part, c.name.to_string(), c.sample_data))).collect()
+    parts
+        .flat_map(|(part, layer)| {
+            layer.channel_data.list.into_iter().map(move |c| (part, c.name.to_string(), c.sample_data))
+        })
+        .collect()
 }
 
 #[test]
@@ -288,7 +358,13 @@ fn parts_hold_colour_data_and_mattes() {
     for (part, name, samples) in channels_of_parts(&path) {
         let expected = match name.as_str() {
             name if name.starts_with("Crypto") => 2,
-            name if name.starts_with("variance") || name.contains("normal") || name.contains("_id.") || name.contains("stats") => 1,
+            name if name.starts_with("variance")
+                || name.contains("normal")
+                || name.contains("_id.")
+                || name.contains("stats") =>
+            {
+                1
+            }
             name if name.ends_with(['X', 'Y', 'Z', 'U', 'V']) => 1,
             _ => 0,
         };
@@ -364,11 +440,14 @@ fn dwa_loses_little() {
     image.layers.truncate(1);
     image.layers[0].data.iter_mut().enumerate().for_each(|(i, v)| *v = 0.5 + 0.4 * ((i / 4) as f32 * 0.05).sin());
     let mut errors = Vec::new();
-    for (compression, level) in [(CompressionDesc::Dwaa, 1.0), (CompressionDesc::Dwaa, 200.0), (CompressionDesc::Dwab, 45.0)] {
+    for (compression, level) in
+        [(CompressionDesc::Dwaa, 1.0), (CompressionDesc::Dwaa, 200.0), (CompressionDesc::Dwab, 45.0)]
+    {
         let output = OutputDesc { compression: Some(compression), dwa_level: Some(level), ..OutputDesc::new("a.exr") };
         write_exr(&path, &image, &output, &info()).unwrap();
         let read = read_exr(&path).unwrap();
-        let error = read.layers[0].data.iter().zip(&image.layers[0].data).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        let error =
+            read.layers[0].data.iter().zip(&image.layers[0].data).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(error < 0.1, "{error}");
         errors.push(error);
         assert!(check_exr(&path, ExrProfileDesc::Default).unwrap().is_empty());
@@ -391,7 +470,14 @@ fn equal_pictures_come_in_equal_files() {
         assert!(bytes[0] == bytes[1] && bytes[1] == bytes[2]);
         // In the order of their names.
         let place = |name: &str| bytes[0].windows(name.len()).position(|window| window == name.as_bytes()).unwrap();
-        let names = ["channels\0", "comments\0", "cryptomatte/3ae39a5/name\0", "dataWindow\0", "steradian/object_id\0", "worldToCamera\0"];
+        let names = [
+            "channels\0",
+            "comments\0",
+            "cryptomatte/3ae39a5/name\0",
+            "dataWindow\0",
+            "steradian/object_id\0",
+            "worldToCamera\0",
+        ];
         assert!(names.windows(2).all(|pair| place(pair[0]) < place(pair[1])));
     }
 }

@@ -70,7 +70,12 @@ impl Windows {
             IntegerBounds::new(Vec2(corner[0], corner[1]), Vec2(crop.width as usize, crop.height as usize))
         };
         let original = (written != image.crop).then(|| bounds(image.crop));
-        Self { display: bounds(shown), data: bounds(written), original, region: Region { available: image.crop, written } }
+        Self {
+            display: bounds(shown),
+            data: bounds(written),
+            original,
+            region: Region { available: image.crop, written },
+        }
     }
 }
 
@@ -87,14 +92,17 @@ impl<'a> Contents<'a> {
     fn new(image: &'a Image, output: &OutputDesc, info: &RenderInfo) -> Self {
         let selected: LayerSet = output.layers.iter().collect();
         let mut contents = Self { sources: Vec::new(), mattes: Vec::new(), texts: Vec::new(), comments: Vec::new() };
-        for layer in image.layers.iter().filter(|layer| selected.contains(layer.kind) || layer.kind == LayerKind::Noisy) {
+        for layer in image.layers.iter().filter(|layer| selected.contains(layer.kind) || layer.kind == LayerKind::Noisy)
+        {
             if layer.kind == LayerKind::Motion && motion_channels(output.profile).is_some() {
                 contents.add_motion(layer, output);
                 continue;
             }
             let group = layer.group.as_ref().map(|group| format!("light_{}.", plain_word(group)));
             let names = match group {
-                Some(prefix) => LayerInfo::of(layer.kind).channels.iter().map(|name| format!("{prefix}{name}")).collect(),
+                Some(prefix) => {
+                    LayerInfo::of(layer.kind).channels.iter().map(|name| format!("{prefix}{name}")).collect()
+                }
                 None => layer.channel_names(),
             };
             contents.add(layer.kind, names, Cow::Borrowed(&layer.data), output);
@@ -115,10 +123,20 @@ impl<'a> Contents<'a> {
             if names.len() == 2 { vec![x, y] } else { halves.to_vec() }
         });
         self.comments.push((PartKind::Utility, comment));
-        self.sources.push(SampleSource { names: names.iter().map(|name| (*name).to_owned()).collect(), data: data.collect(), half: false });
+        self.sources.push(SampleSource {
+            names: names.iter().map(|name| (*name).to_owned()).collect(),
+            data: data.collect(),
+            half: false,
+        });
     }
 
-    fn add_covered(&mut self, selected: LayerSet, coverage: &crate::film::Coverage, identities: &Identities, output: &OutputDesc) {
+    fn add_covered(
+        &mut self,
+        selected: LayerSet,
+        coverage: &crate::film::Coverage,
+        identities: &Identities,
+        output: &OutputDesc,
+    ) {
         for layer in selected.iter().filter(|layer| matches!(layer.source, crate::film::LayerSource::Coverage)) {
             if let Some(mut matte) = coverage::matte(layer.kind, coverage, identities, plan::crypto_depth(output)) {
                 self.add(layer.kind, matte.channels.clone(), Cow::Owned(std::mem::take(&mut matte.data)), output);
@@ -142,7 +160,12 @@ impl<'a> Contents<'a> {
 }
 
 /// The parts of a file, the picture first.
-fn parts(planes: Vec<Plane>, contents: &Contents, common: &Common, windows: &Windows) -> exr::prelude::Layers<AnyChannels<FlatSamples>> {
+fn parts(
+    planes: Vec<Plane>,
+    contents: &Contents,
+    common: &Common,
+    windows: &Windows,
+) -> exr::prelude::Layers<AnyChannels<FlatSamples>> {
     let several = common.output.profile == ExrProfileDesc::Multipart;
     let mut by_part: [Vec<AnyChannel<FlatSamples>>; 3] = Default::default();
     for plane in planes {
@@ -150,15 +173,25 @@ fn parts(planes: Vec<Plane>, contents: &Contents, common: &Common, windows: &Win
         by_part[part as usize].push(plane.into());
     }
     let mut parts = exr::prelude::Layers::new();
-    for (channels, (kind, name)) in by_part.into_iter().zip(PartKind::ALL).filter(|(channels, _)| !channels.is_empty()) {
-        let comments: Vec<&str> =
-            contents.comments.iter().filter(|(part, _)| !several || *part == kind).map(|(_, comment)| *comment).collect();
+    for (channels, (kind, name)) in by_part.into_iter().zip(PartKind::ALL).filter(|(channels, _)| !channels.is_empty())
+    {
+        let comments: Vec<&str> = contents
+            .comments
+            .iter()
+            .filter(|(part, _)| !several || *part == kind)
+            .map(|(_, comment)| *comment)
+            .collect();
         let mut attributes = part_attributes(common, kind, parts.is_empty(), &comments);
         attributes.layer_position = windows.data.position;
         attributes.layer_name = several.then(|| text(name));
         let compression = plan::compression(common.output, kind);
         let encoding = Encoding { compression, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
-        parts.push(FileLayer::new(windows.data.size, attributes, encoding, AnyChannels::sort(channels.into_iter().collect())));
+        parts.push(FileLayer::new(
+            windows.data.size,
+            attributes,
+            encoding,
+            AnyChannels::sort(channels.into_iter().collect()),
+        ));
     }
     parts
 }

@@ -245,7 +245,8 @@ impl PixelStatistics {
         for tile in film.tiles() {
             for index in blocks.of_tile(tile) {
                 let block = block_area(tile, blocks.place(index));
-                let statistics = || block.pixels().map(|(x, y)| tile.group_statistics(tile.index(x, y)).unwrap_or_default());
+                let statistics =
+                    || block.pixels().map(|(x, y)| tile.group_statistics(tile.index(x, y)).unwrap_or_default());
                 let totals = statistics().fold([0.0; 3], |sum, (mean, _)| [0, 1, 2].map(|k| sum[k] + mean[k]));
                 let count = block.area() as f64;
                 for ((x, y), (mean, variance)) in block.pixels().zip(statistics()) {
@@ -334,7 +335,13 @@ impl AdaptivePlanner {
 
     /// Renders at most `most` more groups of every block of a tile that lacks them; the result is how many samples are
     /// in the picture.
-    pub fn render_tile(&self, renderer: &TileRenderer, tile: &mut FilmTile, most: u32, workspace: &mut TileWorkspace) -> u64 {
+    pub fn render_tile(
+        &self,
+        renderer: &TileRenderer,
+        tile: &mut FilmTile,
+        most: u32,
+        workspace: &mut TileWorkspace,
+    ) -> u64 {
         let missing = |index: usize| self.done[index]..(self.done[index] + most).min(self.planned[index]);
         let of_block = |index: usize| missing(index).map(move |group| (self.place(index), group));
         let groups: Vec<([u32; 2], u32)> = self.of_tile(tile).flat_map(of_block).collect();
@@ -343,8 +350,14 @@ impl AdaptivePlanner {
 }
 
 /// Renders a group of samples of each of these blocks; the result is how many samples are in the picture.
-fn render_groups(renderer: &TileRenderer, tile: &mut FilmTile, groups: &[([u32; 2], u32)], workspace: &mut TileWorkspace) -> u64 {
-    let pixel = |[x, y]: [u32; 2], within: u32| [x * BLOCK_SIZE + within % BLOCK_SIZE, y * BLOCK_SIZE + within / BLOCK_SIZE];
+fn render_groups(
+    renderer: &TileRenderer,
+    tile: &mut FilmTile,
+    groups: &[([u32; 2], u32)],
+    workspace: &mut TileWorkspace,
+) -> u64 {
+    let pixel =
+        |[x, y]: [u32; 2], within: u32| [x * BLOCK_SIZE + within % BLOCK_SIZE, y * BLOCK_SIZE + within / BLOCK_SIZE];
     // The pixels of a block side by side, for their rays are alike.
     let of_group = |&(block, group): &([u32; 2], u32)| {
         let of_sample = move |sample: u32| (0..BLOCK_PIXELS).map(move |within| (pixel(block, within), sample));

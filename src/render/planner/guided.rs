@@ -76,7 +76,10 @@ impl GuidedPlanner {
         let gain = self.weights.add(film, &self.iteration, samples, self.rays);
         if let Some(guide) = &self.guide {
             let (leaves, nodes) = (guide.leaves(), guide.directional_nodes());
-            tracing::debug!("guided: iteration of {samples} samples, {gain:.2} times as good as the first; {leaves} leaves, {nodes} nodes");
+            tracing::debug!(
+                "guided: iteration of {samples} samples, {gain:.2} times as good as the first; {leaves} leaves, \
+                 {nodes} nodes"
+            );
         }
         let is_worth_it = MIN_GAINS.iter().all(|&(least, min_gain)| samples < least || gain >= min_gain);
         if self.merged > 0 && !is_worth_it && self.guide.take().is_some() {

@@ -145,7 +145,9 @@ impl IterationWeights {
     pub fn write(&self, out: &mut ByteWriter) {
         out.floats(self.factors.iter().copied());
         for statistics in [&self.first, &self.last] {
-            let values = statistics.iter().flat_map(|s| [s.rays].into_iter().chain(s.variances.iter().flatten().flatten().copied()));
+            let values = statistics
+                .iter()
+                .flat_map(|s| [s.rays].into_iter().chain(s.variances.iter().flatten().flatten().copied()));
             out.floats(values.collect::<Vec<_>>().into_iter());
         }
     }

@@ -95,7 +95,9 @@ impl RenderState {
         let pixels = self.film.sampled().area();
         match &mut self.planner {
             Planner::Adaptive(planner) => return planner.start(&self.film, progress),
-            Planner::Guided(planner) => planner.guide.iter_mut().for_each(|guide| guide.set_bounds(session.accel.bounds())),
+            Planner::Guided(planner) => {
+                planner.guide.iter_mut().for_each(|guide| guide.set_bounds(session.accel.bounds()));
+            }
             Planner::Uniform => {}
         }
         progress.start(self.shard.samples(settings.spp).len() as u32, pixels);
@@ -125,7 +127,9 @@ impl RenderState {
         let (film, samples) = match &mut self.planner {
             Planner::Uniform => (&mut self.film, PassSamples::Uniform { samples, guide: None }),
             Planner::Adaptive(planner) => (&mut self.film, PassSamples::Groups { planner, most: samples.end }),
-            Planner::Guided(planner) => (&mut planner.iteration, PassSamples::Uniform { samples, guide: planner.guide.as_ref() }),
+            Planner::Guided(planner) => {
+                (&mut planner.iteration, PassSamples::Uniform { samples, guide: planner.guide.as_ref() })
+            }
         };
         (&mut film.tiles_mut()[pass.tiles.clone()], samples)
     }

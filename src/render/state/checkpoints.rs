@@ -36,7 +36,13 @@ impl Checkpoints {
 
     /// A pass is done, `elapsed` after this run began, and the next one is expected to take `next`: writes the state if
     /// the interval would be over when that is in the file.
-    pub(in crate::render) fn pass_done(&mut self, state: &RenderState, elapsed: Duration, next: Duration, progress: &dyn Progress) {
+    pub(in crate::render) fn pass_done(
+        &mut self,
+        state: &RenderState,
+        elapsed: Duration,
+        next: Duration,
+        progress: &dyn Progress,
+    ) {
         let requested = self.requested.swap(false, Ordering::Relaxed);
         if requested || self.last.elapsed() + next + self.cost >= self.every {
             self.save(state, elapsed, progress);
@@ -59,7 +65,9 @@ impl Checkpoints {
         match written {
             Ok(()) if self.failed => progress.warn(&format!("{} could be written again", self.file.path().display())),
             Ok(()) => tracing::info!("{}: written in {:.3} s", self.file.path().display(), self.cost.as_secs_f64()),
-            Err(error) if !self.failed => progress.warn(&format!("{error}; the render goes on without a checkpoint of its present state")),
+            Err(error) if !self.failed => {
+                progress.warn(&format!("{error}; the render goes on without a checkpoint of its present state"));
+            }
             Err(_) => {}
         }
         self.failed = failed;

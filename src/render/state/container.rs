@@ -121,11 +121,13 @@ impl Reader {
         let missing = |e: io::Error| Error::Missing { file: path.to_owned(), message: e.to_string() };
         file.seek(SeekFrom::Start(0)).map_err(missing)?;
         let file = BufReader::with_capacity(BUFFER, file);
-        let mut reader = Self { path: path.to_owned(), file, header: Header::default(), is_ours: false, left: length - TRAILER };
+        let mut reader =
+            Self { path: path.to_owned(), file, header: Header::default(), is_ours: false, left: length - TRAILER };
         reader.is_ours = reader.array()? == MAGIC && u32::from_le_bytes(reader.array()?) == VERSION;
         let header_length = u32::from_le_bytes(reader.array()?);
         let header = reader.bytes(u64::from(header_length))?;
-        reader.header = serde_json::from_slice(&header).map_err(|e| reader.fault(format!("the header cannot be understood: {e}")))?;
+        reader.header = serde_json::from_slice(&header)
+            .map_err(|e| reader.fault(format!("the header cannot be understood: {e}")))?;
         if let Some(fault) = reader.header.fault(reader.left) {
             return Err(reader.fault(fault));
         }

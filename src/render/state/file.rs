@@ -61,8 +61,10 @@ mod tests {
     use std::os::unix::fs::symlink;
 
     fn names(folder: &Path) -> Vec<String> {
-        let mut names: Vec<_> =
-            fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        let mut names: Vec<_> = fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+            .collect();
         names.sort();
         names
     }
@@ -94,7 +96,10 @@ mod tests {
         let first = StateFile::take(&path).unwrap();
         let second = StateFile::take(&path).unwrap_err();
         assert_eq!(second.kind(), crate::ErrorKind::Output);
-        assert!(second.to_string().contains(&format!("another process (process {}) is writing it", std::process::id())), "{second}");
+        assert!(
+            second.to_string().contains(&format!("another process (process {}) is writing it", std::process::id())),
+            "{second}"
+        );
         drop(first);
         let again = StateFile::take(&path).unwrap();
         // One that was killed leaves its lock file, but no lock.

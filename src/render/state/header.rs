@@ -55,9 +55,13 @@ impl FromStr for Shard {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let numbers = text.split_once('/').and_then(|(index, count)| Some((index.trim().parse().ok()?, count.trim().parse().ok()?)));
+        let numbers = text
+            .split_once('/')
+            .and_then(|(index, count)| Some((index.trim().parse().ok()?, count.trim().parse().ok()?)));
         let shard = numbers.map(|(index, count)| Self { index, count });
-        shard.filter(|s| (1..=s.count).contains(&s.index)).ok_or_else(|| "expected I/N with I from 1 to N, such as 2/8".to_owned())
+        shard
+            .filter(|s| (1..=s.count).contains(&s.index))
+            .ok_or_else(|| "expected I/N with I from 1 to N, such as 2/8".to_owned())
     }
 }
 
@@ -102,7 +106,13 @@ pub struct Header {
 
 impl Header {
     /// For a render that has not begun.
-    pub fn new(scene_file: &str, fingerprint: SceneFingerprint, scene: &Scene, settings: &Settings, shard: Shard) -> Self {
+    pub fn new(
+        scene_file: &str,
+        fingerprint: SceneFingerprint,
+        scene: &Scene,
+        settings: &Settings,
+        shard: Shard,
+    ) -> Self {
         Self {
             program: concat!("steradian ", env!("CARGO_PKG_VERSION")).to_owned(),
             scene_file: scene_file.to_owned(),
@@ -143,7 +153,10 @@ impl Header {
             Some("a guided render has no shards".to_owned())
         } else if self.done > self.spp {
             Some(format!("{} of {} samples per pixel are done", self.done, self.spp))
-        } else if x + width > full_width || y + height > full_height || (around > 0 && around >= full_width.min(full_height)) {
+        } else if x + width > full_width
+            || y + height > full_height
+            || (around > 0 && around >= full_width.min(full_height))
+        {
             Some("its film is not within its picture".to_owned())
         } else if !(self.film.filter.radius() > 0.0 && self.film.filter.radius() <= MAX_FILTER_RADIUS) {
             Some("its pixel filter has no valid radius".to_owned())
@@ -169,8 +182,11 @@ impl Header {
         }
         if self.scene.whole != other.scene.whole {
             let what = self.scene.differences(&other.scene).join(", ");
-            let files =
-                if self.scene_file == other.scene_file { String::new() } else { format!(" ({}, {})", self.scene_file, other.scene_file) };
+            let files = if self.scene_file == other.scene_file {
+                String::new()
+            } else {
+                format!(" ({}, {})", self.scene_file, other.scene_file)
+            };
             found.push(format!("scene{files}: not the same {what}"));
         }
         let names: BTreeSet<&String> = self.settings.keys().chain(other.settings.keys()).collect();
@@ -193,7 +209,10 @@ fn compared(settings: &Settings, scene: &Scene) -> BTreeMap<String, String> {
         found.remove("spp");
     }
     if scene.features.filtered_textures {
-        found.insert("samples per pixel that textures are filtered for".to_owned(), settings.spp.min(FINEST_SPP).to_string());
+        found.insert(
+            "samples per pixel that textures are filtered for".to_owned(),
+            settings.spp.min(FINEST_SPP).to_string(),
+        );
     }
     found
 }
@@ -207,7 +226,9 @@ pub(in crate::render) fn put(found: &mut BTreeMap<String, String>, name: &str, v
             let dot = if name.is_empty() { "" } else { "." };
             values.iter().for_each(|(key, value)| put(found, &format!("{name}{dot}{key}"), value));
         }
-        Value::Array(values) => drop(found.insert(name.to_owned(), values.iter().map(text).collect::<Vec<_>>().join(","))),
+        Value::Array(values) => {
+            drop(found.insert(name.to_owned(), values.iter().map(text).collect::<Vec<_>>().join(",")));
+        }
         value => drop(found.insert(name.to_owned(), text(value))),
     }
 }

@@ -85,9 +85,9 @@ fn lack(files: &[PathBuf], headers: &[Header]) -> Option<(PathBuf, String)> {
     let mut there: Vec<u32> = headers.iter().map(|header| header.shard.index).collect();
     there.sort_unstable();
     let unfinished = headers.iter().zip(files).filter(|(header, _)| !header.complete);
-    let samples = unfinished
-        .clone()
-        .map(|(header, _)| format!("{} of {} samples of shard {}", header.done, header.shard.samples(header.spp).len(), header.shard));
+    let samples = unfinished.clone().map(|(header, _)| {
+        format!("{} of {} samples of shard {}", header.done, header.shard.samples(header.spp).len(), header.shard)
+    });
     let mut parts: Vec<String> = samples.collect();
     let file = if there.len() < count as usize {
         let list = there.iter().map(u32::to_string).collect::<Vec<_>>().join(",");

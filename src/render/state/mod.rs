@@ -186,8 +186,10 @@ fn fits(reader: &Reader, requested: &Header) -> Result<()> {
         differences.push(format!("shard: {} in the checkpoint, {} requested", there.shard, requested.shard));
     } else if there.shard != Shard::WHOLE && there.spp != requested.spp {
         // Other samples would belong to it.
-        differences
-            .push(format!("spp: {} in the checkpoint, {} requested, and shards are parts of a fixed number", there.spp, requested.spp));
+        differences.push(format!(
+            "spp: {} in the checkpoint, {} requested, and shards are parts of a fixed number",
+            there.spp, requested.spp
+        ));
     } else if there.done + u32::from(there.tiles_ahead > 0) > requested.spp {
         differences.push(format!("spp: pixels have {} samples already, {} requested", there.done, requested.spp));
     }
@@ -204,15 +206,21 @@ fn fits(reader: &Reader, requested: &Header) -> Result<()> {
 pub fn check_kept(settings: &Settings, shard: Shard) -> Result<()> {
     if shard != Shard::WHOLE && settings.is_guided() {
         return Err(Error::Usage(
-            "--shard: not with guiding, for paths learn from nearly all samples before, which each part would render; give --guiding off"
+            "--shard: not with guiding, for paths learn from nearly all samples before, which each part would render; \
+             give --guiding off"
                 .into(),
         ));
     }
     if shard != Shard::WHOLE && settings.target_error.is_some() {
-        return Err(Error::Usage("--shard: not with --target-error, for each part would need the others' samples; give --spp".into()));
+        return Err(Error::Usage(
+            "--shard: not with --target-error, for each part would need the others' samples; give --spp".into(),
+        ));
     }
     if shard.samples(settings.spp).is_empty() {
-        return Err(Error::Usage(format!("--shard {shard}: there are only {} samples per pixel to share out", settings.spp)));
+        return Err(Error::Usage(format!(
+            "--shard {shard}: there are only {} samples per pixel to share out",
+            settings.spp
+        )));
     }
     Ok(())
 }

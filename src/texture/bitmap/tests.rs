@@ -70,8 +70,14 @@ fn a_repeated_image_has_no_seam() {
             let s = i as f32 / 40.0 - 2.0;
             for edge in [-1.0, 0.0, 1.0, 2.0] {
                 let (before, behind) = (edge - 1e-6, edge + 1e-6);
-                assert!((bitmap.scalar(vec2(before, s)) - bitmap.scalar(vec2(behind, s))).abs() < 1e-3, "{wrap:?} u {edge} {s}");
-                assert!((bitmap.scalar(vec2(s, before)) - bitmap.scalar(vec2(s, behind))).abs() < 1e-3, "{wrap:?} v {edge} {s}");
+                assert!(
+                    (bitmap.scalar(vec2(before, s)) - bitmap.scalar(vec2(behind, s))).abs() < 1e-3,
+                    "{wrap:?} u {edge} {s}"
+                );
+                assert!(
+                    (bitmap.scalar(vec2(s, before)) - bitmap.scalar(vec2(s, behind))).abs() < 1e-3,
+                    "{wrap:?} v {edge} {s}"
+                );
             }
         }
     }
@@ -79,7 +85,22 @@ fn a_repeated_image_has_no_seam() {
 
 #[test]
 fn every_uv_finds_a_number() {
-    let odd = [0.0, -0.0, 1.0, -1.0, 0.5, 1e-45, 1e9, -1e9, f32::MAX, f32::MIN, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1.0 - 6e-8];
+    let odd = [
+        0.0,
+        -0.0,
+        1.0,
+        -1.0,
+        0.5,
+        1e-45,
+        1e9,
+        -1e9,
+        f32::MAX,
+        f32::MIN,
+        f32::NAN,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        1.0 - 6e-8,
+    ];
     for (width, height) in [(1, 1), (1, 3), (7, 1), (5, 3)] {
         let bitmap = Bitmap::new(grey(width, &vec![51; width * height]), Decoding::Linear);
         for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
@@ -87,7 +108,10 @@ fn every_uv_finds_a_number() {
                 let bitmap = Bitmap { wrap: [wrap; 2], filter, ..bitmap.clone() };
                 for u in odd {
                     for v in odd {
-                        assert!((bitmap.scalar(vec2(u, v)) - 0.2).abs() < 1e-6, "{width}x{height} {wrap:?} {filter:?} {u} {v}");
+                        assert!(
+                            (bitmap.scalar(vec2(u, v)) - 0.2).abs() < 1e-6,
+                            "{width}x{height} {wrap:?} {filter:?} {u} {v}"
+                        );
                     }
                 }
             }
@@ -111,7 +135,8 @@ fn colours_of_8_and_16_bits_are_srgb_and_floats_and_alpha_are_linear() {
         let color = at(Arc::clone(image), Decoding::Linear);
         assert!((color.r - 188.0 / 255.0).abs() < 1e-6 && color.b == 1.0, "{color:?}");
         for decoding in [Decoding::Srgb, Decoding::Linear] {
-            let alpha = Bitmap { channel: Some(Channel::A), ..Bitmap::new(Arc::clone(image), decoding) }.scalar(Vec2::ZERO);
+            let alpha =
+                Bitmap { channel: Some(Channel::A), ..Bitmap::new(Arc::clone(image), decoding) }.scalar(Vec2::ZERO);
             assert!((alpha - 128.0 / 255.0).abs() < 1e-6, "{alpha}");
         }
     }
@@ -122,23 +147,28 @@ fn colours_of_8_and_16_bits_are_srgb_and_floats_and_alpha_are_linear() {
 }
 
 fn nearest_color(image: Arc<TextureImage>, decoding: Decoding) -> Rgb {
-    let color = Bitmap { filter: TextureFilter::Nearest, ..Bitmap::new(Arc::clone(&image), decoding) }.color(Vec2::ZERO);
+    let color =
+        Bitmap { filter: TextureFilter::Nearest, ..Bitmap::new(Arc::clone(&image), decoding) }.color(Vec2::ZERO);
     let blended = Bitmap::new(image, decoding).color(Vec2::ZERO);
-    assert!((color.r - blended.r).abs() < 1e-6 && (color.g - blended.g).abs() < 1e-6 && (color.b - blended.b).abs() < 1e-6);
+    assert!(
+        (color.r - blended.r).abs() < 1e-6 && (color.g - blended.g).abs() < 1e-6 && (color.b - blended.b).abs() < 1e-6
+    );
     color
 }
 
 #[test]
 fn numbers_are_channels_grey_or_luminance() {
     let color = image(1, 1, 4, Samples::U8(vec![51, 102, 153, 204]));
-    let of = |image: &Arc<TextureImage>, channel| Bitmap { channel, ..Bitmap::new(Arc::clone(image), Decoding::Linear) };
+    let of =
+        |image: &Arc<TextureImage>, channel| Bitmap { channel, ..Bitmap::new(Arc::clone(image), Decoding::Linear) };
     for (channel, expected) in [(Channel::R, 0.2), (Channel::G, 0.4), (Channel::B, 0.6), (Channel::A, 0.8)] {
         let bitmap = of(&color, Some(channel));
         assert!((bitmap.scalar(Vec2::ZERO) - expected).abs() < 1e-6);
         assert!((bitmap.color(Vec2::ZERO).b - expected).abs() < 1e-6);
         let inverted = Bitmap { invert: true, ..bitmap };
         assert!(
-            (inverted.scalar(Vec2::ZERO) - (1.0 - expected)).abs() < 1e-6 && (inverted.color(Vec2::ZERO).r - (1.0 - expected)).abs() < 1e-6
+            (inverted.scalar(Vec2::ZERO) - (1.0 - expected)).abs() < 1e-6
+                && (inverted.color(Vec2::ZERO).r - (1.0 - expected)).abs() < 1e-6
         );
     }
     let luminance = Rgb::new(0.2, 0.4, 0.6).luminance();
@@ -188,8 +218,10 @@ fn over(uv: Vec2, texels: f32, count: usize) -> Footprint<'static> {
 fn footprints_choose_the_level_of_their_texels() {
     let noise: Vec<u8> = (0u32..16 * 8).map(|i| (i * i * 97 % 251) as u8).collect();
     let bitmap = Bitmap::new(grey(16, &noise), Decoding::Srgb);
-    let level =
-        |level: usize| Bitmap { image: Arc::new(bitmap.image.pyramid(Decoding::Srgb).level(level).unwrap().clone()), ..bitmap.clone() };
+    let level = |level: usize| Bitmap {
+        image: Arc::new(bitmap.image.pyramid(Decoding::Srgb).level(level).unwrap().clone()),
+        ..bitmap.clone()
+    };
     let levels = [1, 2].map(|i| Bitmap { decoding: Decoding::Linear, ..level(i) });
     let mean = noise.iter().map(|&v| linear_from_srgb(f32::from(v) / 255.0)).sum::<f32>() / 128.0;
     for i in 0..50 {
@@ -209,7 +241,8 @@ fn footprints_choose_the_level_of_their_texels() {
         close(bitmap.color_over(&over(uv, 1e4, 128)).g, mean);
         // An image that is shown four times has four times as many texels there; an inverted one has their means
         // the same way.
-        let scaled = Bitmap { transform: UvTransform::new(vec2(4.0, -1.0), 0.4, Vec2::ZERO), invert: true, ..bitmap.clone() };
+        let scaled =
+            Bitmap { transform: UvTransform::new(vec2(4.0, -1.0), 0.4, Vec2::ZERO), invert: true, ..bitmap.clone() };
         let upright = Bitmap { transform: scaled.transform, invert: true, ..levels[0].clone() };
         close(scaled.scalar_over(&over(uv, 1.0, 128)), upright.scalar(uv));
     }

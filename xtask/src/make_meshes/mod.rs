@@ -31,7 +31,10 @@ pub fn run() -> Outcome {
     fs::write(scenes.join("meshes/tree_leaves.ply"), ply(&tree.leaves))?;
     fs::write(scenes.join("meshes/crown.ply"), ply(&plants::crown()))?;
     fs::write(scenes.join("meshes/conifer.ply"), ply(&plants::conifer()))?;
-    fs::write(scenes.join("meshes/island.ply"), ply(&Mesh { normals: Vec::new(), ..grid(72, 72, false, shrine::island) }))?;
+    fs::write(
+        scenes.join("meshes/island.ply"),
+        ply(&Mesh { normals: Vec::new(), ..grid(72, 72, false, shrine::island) }),
+    )?;
     fs::write(scenes.join("meshes/gate_beam.ply"), ply(&shrine::beam()))?;
     fs::write(scenes.join("shrine.json"), shrine::scene())?;
     write_sky(&scenes.join("textures/sky.exr"))?;
@@ -92,7 +95,8 @@ pub fn knot(u: f32, v: f32) -> V {
 
 /// The vase of `scenes/revolution.json`: its profile of two Bezier curves, turned about y.
 fn vase(u: f32, v: f32) -> V {
-    const PROFILE: [[f32; 2]; 7] = [[0.26, 0.0], [0.62, 0.1], [0.66, 0.6], [0.36, 0.86], [0.2, 1.0], [0.2, 1.16], [0.33, 1.3]];
+    const PROFILE: [[f32; 2]; 7] =
+        [[0.26, 0.0], [0.62, 0.1], [0.66, 0.6], [0.36, 0.86], [0.2, 1.0], [0.2, 1.16], [0.33, 1.3]];
     let (first, t) = if u < 0.5 { (0, 2.0 * u) } else { (3, 2.0 * u - 1.0) };
     let s = 1.0 - t;
     let weights = [s * s * s, 3.0 * s * s * t, 3.0 * s * t * t, t * t * t];
@@ -161,7 +165,9 @@ fn write_sky(path: &Path) -> std::result::Result<(), Box<dyn Error>> {
             let haze = (1.0 - up).powi(5);
             let blue = vec3(0.16, 0.34, 0.80) * (0.55 + 0.45 * up);
             let glow = direction.dot(sun).max(0.0);
-            blue * (1.0 - haze) + vec3(0.80, 0.86, 0.95) * haze + vec3(1.0, 0.85, 0.6) * (0.5 * glow.powi(16) + 6.0 * glow.powi(400))
+            blue * (1.0 - haze)
+                + vec3(0.80, 0.86, 0.95) * haze
+                + vec3(1.0, 0.85, 0.6) * (0.5 * glow.powi(16) + 6.0 * glow.powi(400))
         };
         let half = f16::from_f32;
         (half(color.x), half(color.y), half(color.z))

@@ -38,7 +38,13 @@ pub struct Tree {
 
 pub fn tree() -> Tree {
     let mut tree = Tree::default();
-    let trunk = Branch { start: V::new(0.0, -0.2, 0.0), direction: vec3(0.08, 1.0, 0.03).normalize(), length: 1.7, radius: 0.2, order: 0 };
+    let trunk = Branch {
+        start: V::new(0.0, -0.2, 0.0),
+        direction: vec3(0.08, 1.0, 0.03).normalize(),
+        length: 1.7,
+        radius: 0.2,
+        order: 0,
+    };
     grow(&mut tree, &mut Rng::new(11), &trunk);
     tree
 }

@@ -57,7 +57,11 @@ pub fn beam() -> Mesh {
 fn ground(x: f32, z: f32) -> f32 {
     let u = (z - HILLS_AT[2]) / (20.0 * HILLS[2]) + 0.5;
     let v = (x - HILLS_AT[0]) / (20.0 * HILLS[0]) + 0.5;
-    if (0.0..1.0).contains(&u) && (0.0..1.0).contains(&v) { terrain(u, v).y * HILLS[1] + HILLS_AT[1] } else { f32::NEG_INFINITY }
+    if (0.0..1.0).contains(&u) && (0.0..1.0).contains(&v) {
+        terrain(u, v).y * HILLS[1] + HILLS_AT[1]
+    } else {
+        f32::NEG_INFINITY
+    }
 }
 
 pub fn scene() -> String {

@@ -27,7 +27,9 @@ pub fn sensitivities(pixels_per_degree: f64) -> [Vec<Kernel>; 3] {
         let rows: Vec<(f64, Vec<f64>)> = channel
             .iter()
             .map(|&(a, b)| {
-                let row = (-radius..=radius).map(|x| (-PI * PI * (f64::from(x) / pixels_per_degree).powi(2) / b).exp()).collect();
+                let row = (-radius..=radius)
+                    .map(|x| (-PI * PI * (f64::from(x) / pixels_per_degree).powi(2) / b).exp())
+                    .collect();
                 (a * (PI / b).sqrt(), row)
             })
             .collect();
@@ -46,13 +48,15 @@ type Detector = fn(f64) -> Kernel;
 
 /// Detectors of edges and of points: the first and second derivative of a Gaussian; positive weights sum to 1, negative
 /// ones to -1.
-pub const DETECTORS: [Detector; 2] = [|ppd| detector(ppd, |x, _| -x), |ppd| detector(ppd, |x, deviation| (x / deviation).powi(2) - 1.0)];
+pub const DETECTORS: [Detector; 2] =
+    [|ppd| detector(ppd, |x, _| -x), |ppd| detector(ppd, |x, deviation| (x / deviation).powi(2) - 1.0)];
 
 fn detector(pixels_per_degree: f64, factor: impl Fn(f64, f64) -> f64) -> Kernel {
     let deviation = 0.5 * DETECTOR_WIDTH * pixels_per_degree;
     let radius = (3.0 * deviation).ceil() as i32;
     let gaussian: Vec<f64> = (-radius..=radius).map(|x| (-0.5 * (f64::from(x) / deviation).powi(2)).exp()).collect();
-    let across: Vec<f64> = (-radius..=radius).zip(&gaussian).map(|(x, g)| factor(f64::from(x), deviation) * g).collect();
+    let across: Vec<f64> =
+        (-radius..=radius).zip(&gaussian).map(|(x, g)| factor(f64::from(x), deviation) * g).collect();
     let sum = |sign: f64| across.iter().filter(|w| **w * sign > 0.0).sum::<f64>().abs();
     let (positive, negative, total) = (sum(1.0), sum(-1.0), gaussian.iter().sum::<f64>());
     Kernel {

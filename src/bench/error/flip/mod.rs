@@ -61,7 +61,8 @@ pub fn mean(differences: &[f32]) -> f64 {
 }
 
 fn planes(image: &Image) -> Result<Planes> {
-    let layer = image.layer(LayerKind::Color).ok_or_else(|| Error::Usage("a picture to compare has no colour".into()))?;
+    let layer =
+        image.layer(LayerKind::Color).ok_or_else(|| Error::Usage("a picture to compare has no colour".into()))?;
     let plane = |c: usize| layer.channel(c).map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 }).collect();
     Ok(Planes { size: [image.crop.width as usize, image.crop.height as usize], planes: [plane(0), plane(1), plane(2)] })
 }
@@ -102,7 +103,8 @@ fn difference(reference: &Planes, test: &Planes) -> Vec<f32> {
     let [reference, test] = [reference, test].map(|picture| Seen::new(&picture.to_opponent()));
     let largest = color::distance([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]).powf(COLOR_EXPONENT);
     let pixel = |i: usize| {
-        let of_color = spread(color::distance(reference.colors.pixel(i), test.colors.pixel(i)).powf(COLOR_EXPONENT), largest);
+        let of_color =
+            spread(color::distance(reference.colors.pixel(i), test.colors.pixel(i)).powf(COLOR_EXPONENT), largest);
         let features = (0..2).map(|k| (reference.features[k][i] - test.features[k][i]).abs()).fold(0.0, f32::max);
         of_color.powf(1.0 - (features * std::f32::consts::FRAC_1_SQRT_2).powf(FEATURE_EXPONENT))
     };
@@ -112,7 +114,11 @@ fn difference(reference: &Planes, test: &Planes) -> Vec<f32> {
 /// Small differences, which are most, get most of the range.
 fn spread(difference: f32, largest: f32) -> f32 {
     let bend = BEND * largest;
-    if difference < bend { BEND_TO / bend * difference } else { BEND_TO + (difference - bend) / (largest - bend) * (1.0 - BEND_TO) }
+    if difference < bend {
+        BEND_TO / bend * difference
+    } else {
+        BEND_TO + (difference - bend) / (largest - bend) * (1.0 - BEND_TO)
+    }
 }
 
 /// What the eye makes of a picture at a distance.

@@ -33,7 +33,10 @@ fn a_pair_of_bright_pictures_differs_as_the_authors_say() {
     // The exposures are those of the reference, so that the order matters a little.
     assert!((mean(&hdr_flip(&b, &a).unwrap()) - 0.735_690_2).abs() < 2e-4);
     let found = exposures(&planes(&a).unwrap());
-    assert!(found.len() == 4 && (found[0] + 0.463_154).abs() < 1e-4 && (found[3] - 3.244_490).abs() < 1e-4, "{found:?}");
+    assert!(
+        found.len() == 4 && (found[0] + 0.463_154).abs() < 1e-4 && (found[3] - 3.244_490).abs() < 1e-4,
+        "{found:?}"
+    );
     // A median of black is as far as it goes.
     let dark = picture(SIZE, |x, y| if y < 20 { [0.0; 3] } else { reference(x, y) });
     assert!((mean(&hdr_flip(&dark, &b).unwrap()) - 0.924_697_2).abs() < 2e-4);
@@ -41,7 +44,8 @@ fn a_pair_of_bright_pictures_differs_as_the_authors_say() {
 
 #[test]
 fn what_a_screen_shows_differs_as_the_authors_say_in_either_order() {
-    let clamp = |of: fn(u32, u32) -> [f32; 3]| planes(&picture(SIZE, |x, y| of(x, y).map(|v| v.clamp(0.0, 1.0)))).unwrap();
+    let clamp =
+        |of: fn(u32, u32) -> [f32; 3]| planes(&picture(SIZE, |x, y| of(x, y).map(|v| v.clamp(0.0, 1.0)))).unwrap();
     let (a, b) = (clamp(reference), clamp(test));
     let there = difference(&a, &b);
     assert!((mean(&there) - 0.496_322_2).abs() < 2e-4, "{}", mean(&there));

@@ -18,8 +18,13 @@ fn corner(mesh: &Mesh, i: usize) -> DVec3 {
 fn judged(outcome: Outcome, geometry: &Geometry, rays: Vec<Ray>) -> Outcome {
     let rays = oracle_hits(&LinearAccel::new(geometry), rays);
     let hits = rays.iter().filter(|(_, hit)| hit.is_some()).count();
-    let outcome = outcome.record("rays", rays.len() as f64).at_least("share of rays that hit", hits as f64 / rays.len() as f64, 0.4);
-    let lost = |outcome: Outcome, name: &str, lost| outcome.none(format!("answers of {name} that differ in a bit"), lost);
+    let outcome = outcome.record("rays", rays.len() as f64).at_least(
+        "share of rays that hit",
+        hits as f64 / rays.len() as f64,
+        0.4,
+    );
+    let lost =
+        |outcome: Outcome, name: &str, lost| outcome.none(format!("answers of {name} that differ in a bit"), lost);
     own(geometry).into_iter().fold(outcome, |outcome, (name, accel)| lost(outcome, name, differing(&*accel, &rays)))
 }
 
@@ -48,7 +53,11 @@ struct Round {
 impl Round {
     fn new(rng: &mut Rng, center: DVec3, is_disk: bool) -> Self {
         let (radius, turn) = (rng.range(0.1, 2.0), rng.rotation());
-        let shape = if is_disk { Disk::new(radius, 0.0, TAU).map(Analytic::Disk) } else { Sphere::full(radius).map(Analytic::Sphere) };
+        let shape = if is_disk {
+            Disk::new(radius, 0.0, TAU).map(Analytic::Disk)
+        } else {
+            Sphere::full(radius).map(Analytic::Sphere)
+        };
         let placed = TransformedShape::new(shape.expect("radii are above zero"), transform(turn, center));
         Self { center, radius, normal: is_disk.then_some(turn.z_axis), placed }
     }
@@ -115,7 +124,8 @@ pub(super) fn f6_far_cameras(effort: Effort) -> Outcome {
         .none("of those, rays that miss by the oracle", missed)
         .none("answers of six accelerators that differ from the oracle's", differ)
         .plot(Plot {
-            caption: "Share of rays from afar at a unit sphere that an accelerator answers otherwise than the oracle".into(),
+            caption: "Share of rays from afar at a unit sphere that an accelerator answers otherwise than the oracle"
+                .into(),
             x: "distance in radii".into(),
             y: "share of rays".into(),
             floor: 1e-7,

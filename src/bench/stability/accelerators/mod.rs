@@ -20,15 +20,18 @@ use crate::math::{DVec3, Ray};
 
 checks! {
     "F1" f1_closest_hits "closest hits are the oracle's":
-        "19 scenes: soups, bumpy, tiny, far and sliver meshes, overlaps, stairs, analytic shapes, instances, motion, nothing; camera, bounce, shadow, \
-         random, axis-parallel and grazing rays; Embree's distances within 8 ulp, and over the cosine 4 roundoffs of the reach and the bound on \
-         the surface's error (Mitsuba, test_kdtrees; CGAL, aabb_naive_vs_tree_triangle_test)";
+        "19 scenes: soups, bumpy, tiny, far and sliver meshes, overlaps, stairs, analytic shapes, instances, motion, \
+         nothing; camera, bounce, shadow, random, axis-parallel and grazing rays; Embree's distances within 8 ulp, and \
+         over the cosine 4 roundoffs of the reach and the bound on the surface's error (Mitsuba, test_kdtrees; CGAL, \
+         aabb_naive_vs_tree_triangle_test)";
     "F2" f2_ties "ties go to the lowest ids":
         "three equal grids in one plane, rays through every corner and every middle of an edge (Embree, next_hit)";
     "F3" f3_any_hit "any hit means that there is a closest hit":
-        "the scenes of F1, intervals that end at the hit, one float before it and one behind it (Mitsuba, test_kdtrees)";
+        "the scenes of F1, intervals that end at the hit, one float before it and one behind it (Mitsuba, \
+         test_kdtrees)";
     "F4" f4_grazed_boxes "rays that graze boxes lose nothing":
-        "60 axis-parallel boxes, rays through their corners and along their edges from near and far (Ize, Robust BVH Ray Traversal)";
+        "60 axis-parallel boxes, rays through their corners and along their edges from near and far (Ize, Robust BVH \
+         Ray Traversal)";
     "F5" f5_extreme_points "bounds of analytic shapes hold their extreme points":
         "64 spheres and disks at three distances from the origin, rays that graze their six extreme points from within";
     "F6" f6_far_cameras "a far camera sees the whole sphere":
@@ -36,9 +39,11 @@ checks! {
     "F7" f7_axis_parallel_rays "rays with zero components":
         "soups, rays with one or two components 0 or -0, origins in planes of the boxes' faces";
     "F8" f8_motion_bounds "bounds hold what moves at every time":
-        "random keyframed motions, and their products, of points in a box, deforming triangles (pbrt-v4, AnimatedTransform.Randoms)";
+        "random keyframed motions, and their products, of points in a box, deforming triangles (pbrt-v4, \
+         AnimatedTransform.Randoms)";
     "F9" f9_visits "nodes and primitives visited":
-        "bumpy sphere of 70,000 triangles; at most 40 in hierarchies and 64 in trees by camera rays; recorded figures hold within 10 %, so that a loss is noticed";
+        "bumpy sphere of 70,000 triangles; at most 40 in hierarchies and 64 in trees by camera rays; recorded figures \
+         hold within 10 %, so that a loss is noticed";
 }
 
 /// How many of `items` have a property, tried in parallel.
@@ -122,9 +127,11 @@ fn f1_closest_hits(effort: Effort) -> Outcome {
             *sum = Agreement { flags: sum.flags + flags, distances: sum.distances + distances, ties: sum.ties + ties };
         }
     }
-    let outcome = Outcome::new().record("rays", rays as f64).record("hits", hits as f64).none("scenes hardly hit", poor);
     let outcome =
-        counts.into_iter().fold(outcome, |outcome, (name, lost)| outcome.none(format!("answers of {name} that differ in a bit"), lost));
+        Outcome::new().record("rays", rays as f64).record("hits", hits as f64).none("scenes hardly hit", poor);
+    let outcome = counts
+        .into_iter()
+        .fold(outcome, |outcome, (name, lost)| outcome.none(format!("answers of {name} that differ in a bit"), lost));
     ["Embree", "packets"].iter().zip(rounding).fold(outcome, |outcome, (name, Agreement { flags, distances, ties })| {
         outcome
             .none(format!("distances of {name} beyond their rounding"), distances)
@@ -153,7 +160,10 @@ fn f2_ties(_: Effort) -> Outcome {
     let mut wrong = 0;
     for (_, accel) in own(&geometry) {
         let is_first = |hit: Hit, first: &Option<usize>| hit.shape == ShapeId(0) && Some(hit.prim.index()) == *first;
-        wrong += expected.iter().filter(|(ray, first)| !accel.intersect(ray).is_some_and(|hit| is_first(hit, first))).count();
+        wrong += expected
+            .iter()
+            .filter(|(ray, first)| !accel.intersect(ray).is_some_and(|hit| is_first(hit, first)))
+            .count();
     }
     // Embree may take any of them; through corners it loses some rays (A5).
     let embree = build(AccelKind::EMBREE, &geometry);
@@ -200,13 +210,15 @@ fn f3_any_hit(effort: Effort) -> Outcome {
     // A ray through an edge, nearly parallel to a side of the box around the triangle, may enter that box some ulp
     // behind the triangle's own distance.
     let result = Outcome::new().record("rays", total as f64);
-    let judged = |result: Outcome, (name, wrong): (&str, usize)| {
-        match (name, wrong) {
+    let judged = |result: Outcome, (name, wrong): (&str, usize)| match (name, wrong) {
         ("embree", 1..) => result
             .at_most("contradictions of embree in a million rays", 1e6 * wrong as f64 / total as f64, 10.0)
-            .short(format!("{wrong} of {total} rays pass an edge nearly parallel to a side of the box around its triangle, a fraction of a rounding outside: Embree enters the box behind the distance of its own hit (by 75 ulp on one ray), so that an interval cut there leaves the hit out; wished for is none")),
+            .short(format!(
+                "{wrong} of {total} rays pass an edge nearly parallel to a side of the box around its triangle, a \
+                 fraction of a rounding outside: Embree enters the box behind the distance of its own hit (by 75 ulp \
+                 on one ray), so that an interval cut there leaves the hit out; wished for is none"
+            )),
         _ => result.none(format!("contradictions of {name}"), wrong),
-    }
     };
     outcome.into_iter().fold(result, judged)
 }

@@ -47,5 +47,8 @@ pub(super) fn f8_motion_bounds(effort: Effort) -> Outcome {
         .record("pairs of point and time", pairs as f64)
         .none("points outside of their instance's bounds", outside)
         .none("corners outside of their triangle's bounds", crossed)
-        .record("area of the bounds over that of the box reached, median", looseness.get(looseness.len() / 2).copied().unwrap_or(f64::NAN))
+        .record(
+            "area of the bounds over that of the box reached, median",
+            looseness.get(looseness.len() / 2).copied().unwrap_or(f64::NAN),
+        )
 }

@@ -9,8 +9,12 @@ use crate::math::Ray;
 
 /// Nodes and primitives of camera and of bounce rays as recorded, to notice a change; with the most that is acceptable
 /// for camera rays.
-const RECORDED: [(&str, [f64; 2], f64); 4] =
-    [("bvh", [8.50, 25.0], 40.0), ("bvh:binary", [17.2, 48.8], 40.0), ("kdtree", [36.0, 96.7], 64.0), ("octree", [10.3, 32.7], 64.0)];
+const RECORDED: [(&str, [f64; 2], f64); 4] = [
+    ("bvh", [8.50, 25.0], 40.0),
+    ("bvh:binary", [17.2, 48.8], 40.0),
+    ("kdtree", [36.0, 96.7], 64.0),
+    ("octree", [10.3, 32.7], 64.0),
+];
 
 pub(super) fn f9_visits(effort: Effort) -> Outcome {
     let geometry = meshes(vec![bumpy_sphere(70_000)]);

@@ -5,7 +5,9 @@ use rayon::prelude::*;
 use super::{Effort, Outcome};
 use crate::accel::{AccelKind, Accelerator, EmbreeAccel, EmbreeOptions, EmbreeQuality, LinearAccel};
 use crate::bench::bumpy_sphere;
-use crate::bench::stability::geometry::{Rng, all_analytic_shapes, cube, instances, meshes, ray, soup, transform, triangle, world};
+use crate::bench::stability::geometry::{
+    Rng, all_analytic_shapes, cube, instances, meshes, ray, soup, transform, triangle, world,
+};
 use crate::bench::stability::scenes::{all, all_answers, build, moving_scene, same, scenes, test_rays};
 use crate::geometry::{Geometry, Shape, TransformedShape};
 use crate::math::{DMat3, DVec3, Ray, Transform};
@@ -30,7 +32,9 @@ fn hits_of_nothing(rays: &[Ray]) -> usize {
     let no_shapes = instances(vec![], &[transform(DMat3::IDENTITY, DVec3::ZERO)]);
     let of = |accel: &dyn Accelerator| {
         let answers = all_answers(accel, rays).into_iter();
-        let hits: usize = answers.map(|(hits, occluded)| hits.iter().flatten().count() + occluded.iter().filter(|o| **o).count()).sum();
+        let hits: usize = answers
+            .map(|(hits, occluded)| hits.iter().flatten().count() + occluded.iter().filter(|o| **o).count())
+            .sum();
         hits + usize::from(!accel.bounds().is_empty())
     };
     [Geometry::default(), no_shapes]
@@ -40,7 +44,9 @@ fn hits_of_nothing(rays: &[Ray]) -> usize {
 }
 
 fn single_shapes() -> Vec<Geometry> {
-    let analytic = all_analytic_shapes().into_iter().map(|(_, shape)| Shape::Analytic(TransformedShape::new(shape, Transform::IDENTITY)));
+    let analytic = all_analytic_shapes()
+        .into_iter()
+        .map(|(_, shape)| Shape::Analytic(TransformedShape::new(shape, Transform::IDENTITY)));
     let triangle = Shape::Mesh(triangle(-DVec3::X, DVec3::new(1.0, 0.3, 0.2), DVec3::Y));
     analytic.chain([triangle]).map(|shape| world(vec![shape])).collect()
 }
@@ -50,7 +56,9 @@ fn leaks(effort: Effort, rng: &mut Rng) -> usize {
     let geometry = meshes(vec![bumpy_sphere(effort.pick(20_000, 1_000_000))]);
     let rays: Vec<Ray> = (0..effort.pick(2_000, 100_000)).map(|_| ray(0.5 * rng.cube(), rng.direction())).collect();
     let kinds = AccelKind::ALL.into_iter().filter(|(kind, _)| *kind != AccelKind::Linear);
-    let lost = |accel: &dyn Accelerator| rays.par_iter().filter(|ray| accel.intersect(ray).is_none() || !accel.occluded(ray)).count();
+    let lost = |accel: &dyn Accelerator| {
+        rays.par_iter().filter(|ray| accel.intersect(ray).is_none() || !accel.occluded(ray)).count()
+    };
     kinds.map(|(kind, _)| lost(&*build(kind, &geometry))).sum()
 }
 
@@ -58,11 +66,13 @@ fn leaks(effort: Effort, rng: &mut Rng) -> usize {
 fn disturbed(rng: &mut Rng) -> usize {
     let geometries = [10, 100, 300].map(|count| meshes(vec![soup(rng, count, 0.4)]));
     let rays = test_rays(rng, &geometries[0], 1_000);
-    let alone =
-        geometries.each_ref().map(|g| rays.iter().map(|ray| build(AccelKind::EMBREE, g).intersect(ray)).take(50).collect::<Vec<_>>());
+    let alone = geometries
+        .each_ref()
+        .map(|g| rays.iter().map(|ray| build(AccelKind::EMBREE, g).intersect(ray)).take(50).collect::<Vec<_>>());
     let together = geometries.each_ref().map(|geometry| build(AccelKind::EMBREE, geometry));
-    let differing =
-        |(i, ray): (usize, &Ray)| (0..3).filter(|&k| alone[k].get(i).is_some_and(|hit| *hit != together[k].intersect(ray))).count();
+    let differing = |(i, ray): (usize, &Ray)| {
+        (0..3).filter(|&k| alone[k].get(i).is_some_and(|hit| *hit != together[k].intersect(ray))).count()
+    };
     rays.iter().enumerate().map(differing).sum()
 }
 

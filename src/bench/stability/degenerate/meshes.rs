@@ -24,7 +24,8 @@ fn garbage(rng: &mut Rng, largest: u32) -> Result<Mesh, MeshError> {
 /// Whether a mesh holds only what it may hold.
 fn is_valid(mesh: &Mesh) -> bool {
     let count = mesh.positions().len() as u32;
-    mesh.positions().iter().flatten().all(|x| x.abs() < EMBREE_LARGE) && mesh.triangles().iter().flatten().all(|&i| i < count)
+    mesh.positions().iter().flatten().all(|x| x.abs() < EMBREE_LARGE)
+        && mesh.triangles().iter().flatten().all(|&i| i < count)
 }
 
 fn is_finite(bounds: &Aabb) -> bool {

@@ -2,14 +2,17 @@
 
 use super::{Effort, Outcome};
 use crate::accel::{AccelKind, Accelerator};
-use crate::bench::stability::geometry::{Rng, cube, instances, meshes, placed_analytic_shapes, transform, triangle, world};
+use crate::bench::stability::geometry::{
+    Rng, cube, instances, meshes, placed_analytic_shapes, transform, triangle, world,
+};
 use crate::bench::stability::scenes::{INEXACT_RECIPROCALS, all, all_answers, build, distance_error};
 use crate::geometry::{Geometry, Hit, Shape};
 use crate::math::float::{SMALLEST_NORMAL, step_past};
 use crate::math::{DMat3, DVec3, Ray, Vec3};
 
 /// A valid ray that hits every scene of [`scenes`].
-const GOOD: Ray = Ray { origin: Vec3::new(0.1, 0.2, 0.3), t_min: 0.0, direction: Vec3::Z, t_max: f32::INFINITY, time: 0.0 };
+const GOOD: Ray =
+    Ray { origin: Vec3::new(0.1, 0.2, 0.3), t_min: 0.0, direction: Vec3::Z, t_max: f32::INFINITY, time: 0.0 };
 
 /// The smallest number above zero, a denormal.
 const SMALLEST: f32 = f32::from_bits(1);
@@ -46,7 +49,10 @@ fn invalid_rays() -> Vec<Ray> {
         }
         rays.push(Ray { time: bad, ..GOOD });
     }
-    rays.extend([f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, -SMALLEST_NORMAL, -SMALLEST].map(|t_min| Ray { t_min, ..GOOD }));
+    rays.extend(
+        [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, -SMALLEST_NORMAL, -SMALLEST]
+            .map(|t_min| Ray { t_min, ..GOOD }),
+    );
     rays.extend([f32::NAN, f32::NEG_INFINITY, -1.0, -SMALLEST].map(|t_max| Ray { t_max, ..GOOD }));
     rays.extend([-1e-7, 1.000_000_1].map(|time| Ray { time, ..GOOD }));
     rays.push(Ray { t_min: 2.0, t_max: 1.0, ..GOOD });
@@ -83,7 +89,9 @@ fn hits(accel: &dyn Accelerator, rays: &[Ray]) -> usize {
 /// How many answers name a distance that is not within the ray's interval.
 fn outside(accel: &dyn Accelerator, rays: &[Ray]) -> usize {
     let within = |ray: &Ray, t: f32| ray.t_min <= t && t <= ray.t_max;
-    let of = |hits: Vec<Option<Hit>>| hits.iter().zip(rays).filter(|(hit, ray)| hit.is_some_and(|h| !within(ray, h.t))).count();
+    let of = |hits: Vec<Option<Hit>>| {
+        hits.iter().zip(rays).filter(|(hit, ray)| hit.is_some_and(|h| !within(ray, h.t))).count()
+    };
     all_answers(accel, rays).into_iter().map(|(hits, _)| of(hits)).sum()
 }
 
@@ -131,7 +139,11 @@ pub(super) fn e2_zero_directions(effort: Effort) -> Outcome {
                 let on = accel.intersect(&start).map_or(start.origin, |hit| start.at(hit.t));
                 zeros.extend([start.origin, on].map(|origin| Ray { origin, direction, ..start }));
                 let length = rng.magnitude(-45.0, -30.0) as f32;
-                tiny.extend([start.origin, on].map(|origin| Ray { origin, direction: start.direction * length, ..start }));
+                tiny.extend([start.origin, on].map(|origin| Ray {
+                    origin,
+                    direction: start.direction * length,
+                    ..start
+                }));
             }
             tried += zeros.len();
             struck += hits(&*accel, &zeros);
@@ -197,7 +209,8 @@ pub(super) fn e6_steps_past_hits(effort: Effort) -> Outcome {
     for scale in [1.0, 1e-10, 1e-20] {
         let plane = |i: usize| DVec3::Z * (i as f64 * scale);
         let corner = |i: usize, d: DVec3| plane(i) + 4.0 * scale * d;
-        let side = |i: usize| triangle(corner(i, -DVec3::X - DVec3::Y), corner(i, 2.0 * DVec3::X), corner(i, 2.0 * DVec3::Y));
+        let side =
+            |i: usize| triangle(corner(i, -DVec3::X - DVec3::Y), corner(i, 2.0 * DVec3::X), corner(i, 2.0 * DVec3::Y));
         let geometry = meshes((0..PLANES).map(side).collect());
         for (_, accel) in everyone(&geometry) {
             for length in [1.0, 1e10, 1e18] {

@@ -32,18 +32,37 @@ fn scene(s: f64, offset: [f64; 3]) -> Value {
             "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 }
         },
         "shapes": [
-            { "type": "quad", "material": "grey", "origin": at([-4.0, 0.0, 4.0]), "edge_u": along([8.0, 0.0, 0.0]), "edge_v": along([0.0, 0.0, -8.0]) },
-            { "type": "sphere", "material": "glass", "radius": 0.5 * s, "transform": [{ "translate": at([-0.7, 0.5, 0.3]) }] },
-            { "type": "cone", "material": "grey", "radius": 0.4 * s, "height": 0.9 * s,
-              "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": -90 } }, { "translate": at([0.2, 0.0, -0.9]) }] },
-            { "type": "mesh", "material": "grey", "triangles": [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
-              "positions": [at([-1.6, 0.02, -0.8]), at([-0.9, 0.02, -0.5]), at([-1.2, 0.02, -1.4]), at([-1.2, 0.9, -0.9])] },
+            {
+                "type": "quad", "material": "grey", "origin": at([-4.0, 0.0, 4.0]), "edge_u": along([8.0, 0.0, 0.0]),
+                "edge_v": along([0.0, 0.0, -8.0])
+            },
+            {
+                "type": "sphere", "material": "glass", "radius": 0.5 * s,
+                "transform": [{ "translate": at([-0.7, 0.5, 0.3]) }]
+            },
+            {
+                "type": "cone", "material": "grey", "radius": 0.4 * s, "height": 0.9 * s,
+                "transform": [
+                    { "rotate": { "axis": [1, 0, 0], "degrees": -90 } }, { "translate": at([0.2, 0.0, -0.9]) }
+                ]
+            },
+            {
+                "type": "mesh", "material": "grey", "triangles": [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
+                "positions": [
+                    at([-1.6, 0.02, -0.8]), at([-0.9, 0.02, -0.5]), at([-1.2, 0.02, -1.4]), at([-1.2, 0.9, -0.9])
+                ]
+            },
             { "type": "disk", "radius": 0.4 * s, "emission": { "radiance": [9, 8, 7] },
               "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": 90 } }, { "translate": at([0.0, 2.5, 0.0]) }] }
         ],
         "objects": { "block": { "shapes": [{ "type": "cube", "material": "gold" }] } },
-        "instances": [{ "object": "block", "transform": [
-            { "scale": 0.35 * s }, { "rotate": { "axis": [0, 1, 0], "degrees": 30 } }, { "translate": at([0.8, 0.36, 0.4]) }] }],
+        "instances": [{
+            "object": "block",
+            "transform": [
+                { "scale": 0.35 * s }, { "rotate": { "axis": [0, 1, 0], "degrees": 30 } },
+                { "translate": at([0.8, 0.36, 0.4]) }
+            ]
+        }],
         "lights": [
             { "type": "environment", "radiance": [0.2, 0.3, 0.4] },
             { "type": "point", "position": at([-1.5, 1.5, 1.5]), "intensity": [1.5 * s * s, 1.5 * s * s, 1.5 * s * s] }
@@ -97,7 +116,8 @@ pub(super) fn e7_scenes_of_every_size(effort: Effort) -> Outcome {
     let mut tests = 0;
     for name in ["embree", "bvh"] {
         let Ok(kind) = name.parse() else { continue };
-        let blocks = |s: f64, first: u64| (0..runs).map(|i| block_means(&picture(s, kind, first + i))).collect::<Vec<_>>();
+        let blocks =
+            |s: f64, first: u64| (0..runs).map(|i| block_means(&picture(s, kind, first + i))).collect::<Vec<_>>();
         let (expected, same_seed) = (blocks(1.0, 1), picture(1.0, kind, 1));
         let noise = difference(&picture(1.0, kind, 2), &same_seed);
         let (mut curve, mut level) = (Vec::new(), Vec::new());

@@ -60,9 +60,14 @@ fn changed_codes(folder: &std::path::Path) -> usize {
     let size = [256, 9];
     let data = (0..size[0] * size[1]).flat_map(|i| [ramp(i), ramp(i + 85), ramp(i + 170), 1.0]).collect();
     let image = Image::of_color(size, data);
-    let Some(read) = write_png(&path, &image, 0.0, ViewDesc::Srgb).ok().and_then(|()| image::open(&path).ok()) else { return 256 };
+    let Some(read) = write_png(&path, &image, 0.0, ViewDesc::Srgb).ok().and_then(|()| image::open(&path).ok()) else {
+        return 256;
+    };
     let code = |x: u32, shift: u32| ((x + shift) % 256) as u8;
-    read.into_rgb8().enumerate_pixels().filter(|(x, _, pixel)| pixel.0 != [code(*x, 0), code(*x, 85), code(*x, 170)]).count()
+    read.into_rgb8()
+        .enumerate_pixels()
+        .filter(|(x, _, pixel)| pixel.0 != [code(*x, 0), code(*x, 85), code(*x, 170)])
+        .count()
 }
 
 /// The relative error of a film's mean of a million numbers from that of a compensated sum.
@@ -86,7 +91,9 @@ pub(super) fn m7_files(effort: Effort) -> Outcome {
     let (mut floats, mut halves, mut again, mut lost) = (0, 0, 0, 0);
     for _ in 0..effort.pick(2, 50) {
         let image = picture(&mut rng);
-        for (compression, pixel_type) in COMPRESSIONS.into_iter().flat_map(|c| [(c, PixelTypeDesc::Float), (c, PixelTypeDesc::Half)]) {
+        for (compression, pixel_type) in
+            COMPRESSIONS.into_iter().flat_map(|c| [(c, PixelTypeDesc::Float), (c, PixelTypeDesc::Half)])
+        {
             let layers = vec![LayerKind::Z, LayerKind::N, LayerKind::P, LayerKind::Albedo];
             let desc = OutputDesc { layers, pixel_type, compression: Some(compression), ..OutputDesc::new("a.exr") };
             let written = write_exr(&path, &image, &desc, &RenderInfo::default());

@@ -32,8 +32,10 @@ pub(super) fn m1_integrals(effort: Effort) -> Outcome {
         let filter = Filter::new(desc);
         let r = f64::from(filter.radius());
         let at = |i: u32| (r * (2.0 * (f64::from(i) + 0.5) / f64::from(steps) - 1.0)) as f32;
-        let sum: f64 =
-            (0..steps).flat_map(|i| (0..steps).map(move |j| (i, j))).map(|(i, j)| filter.evaluate(Vec2::new(at(i), at(j)))).sum();
+        let sum: f64 = (0..steps)
+            .flat_map(|i| (0..steps).map(move |j| (i, j)))
+            .map(|(i, j)| filter.evaluate(Vec2::new(at(i), at(j))))
+            .sum();
         let measured = sum * (2.0 * r / f64::from(steps)).powi(2);
         worst = worst.max((measured / closed_form(desc, r).powi(2) - 1.0).abs());
         let beyond = filter.radius().next_up();
@@ -88,7 +90,8 @@ fn p_value(filter: &Filter, rng: &mut Rng, draws: u32) -> f64 {
         let cell = |x: f32| (((f64::from(x) / r + 1.0) * 0.5 * SIDE as f64) as usize).min(SIDE - 1);
         counts[cell(offset.y) * SIDE + cell(offset.x)] += 1;
     }
-    let expected: Vec<f64> = (0..SIDE * SIDE).map(|i| f64::from(draws) * axis[i / SIDE] * axis[i % SIDE] / (total * total)).collect();
+    let expected: Vec<f64> =
+        (0..SIDE * SIDE).map(|i| f64::from(draws) * axis[i / SIDE] * axis[i % SIDE] / (total * total)).collect();
     chi_squared_p_value(&counts, &expected)
 }
 

@@ -16,26 +16,32 @@ use crate::accel::AccelKind;
 use crate::color::Rgb;
 use crate::desc::{FilterDesc, FilterSamplesDesc};
 use crate::film::{
-    Crop, Film, FilmShape, FilmTile, Filter, Image, LayerKind, LayerSet, LightAovSample, PixelSample, Sample, Splats, SurfaceSample,
+    Crop, Film, FilmShape, FilmTile, Filter, Image, LayerKind, LayerSet, LightAovSample, PixelSample, Sample, Splats,
+    SurfaceSample,
 };
 use crate::render::Overrides;
 
 checks! {
     "M1" m1_integrals "integrals of filters":
-        "ten filters against closed forms by 256 x 256 midpoints; nothing outside of the radius (pbrt-v4, filters_test)";
+        "ten filters against closed forms by 256 x 256 midpoints; nothing outside of the radius (pbrt-v4, \
+         filters_test)";
     "M2" m2_sampled_filters "samples follow their filter":
-        "mass of each half pixel against the filter's integral, negative lobes included, and χ² tests in 16 x 16 cells: what splatting onto 5 x 5 pixels \
-         tests where a sample touches one pixel (Mitsuba, test_imageblock)";
+        "mass of each half pixel against the filter's integral, negative lobes included, and χ² tests in 16 x 16 \
+         cells: what splatting onto 5 x 5 pixels tests where a sample touches one pixel (Mitsuba, test_imageblock)";
     "M3" m3_constants "a constant stays constant":
-        "radiance 1 with every filter, tiles of 1, 7 and 64 pixels, crops, one to five samples; and rendered pictures of a white sky";
+        "radiance 1 with every filter, tiles of 1, 7 and 64 pixels, crops, one to five samples; and rendered pictures \
+         of a white sky";
     "M4" m4_same_bytes "the same bytes for any number of threads and order of tiles":
-        "a scene with lens, glass and gold by 1, 2, 3 and 8 threads; tiles filled forward, backward and shuffled; the bytes of PNG files";
+        "a scene with lens, glass and gold by 1, 2, 3 and 8 threads; tiles filled forward, backward and shuffled; the \
+         bytes of PNG files";
     "M5" m5_no_clamping "rare bright samples keep their share":
-        "one sample in a million of radiance a million; Pareto samples of exponent 1.8; lights over a thousandth of each pixel";
+        "one sample in a million of radiance a million; Pareto samples of exponent 1.8; lights over a thousandth of \
+         each pixel";
     "M6" m6_spoilt_samples "samples that are no numbers":
         "NaN and infinities in radiance, alpha, weight and depth, between good samples; negative radiance";
     "M7" m7_files "files come back":
-        "EXR of every layer with each compression, floats and halves; all codes of a PNG; sums of a million samples (pbrt-v4, image_test)";
+        "EXR of every layer with each compression, floats and halves; all codes of a PNG; sums of a million samples \
+         (pbrt-v4, image_test)";
 }
 
 fn gray(v: f32) -> PixelSample {
@@ -84,14 +90,16 @@ fn mean_by_film(values: impl Iterator<Item = f32>) -> f64 {
 }
 
 fn m3_constants(effort: Effort) -> Outcome {
-    let mut filtering = Filtering { filter: Filter::new(&FilterDesc::default()), rng: Rng::new(3), splats: Splats::default() };
+    let mut filtering =
+        Filtering { filter: Filter::new(&FilterDesc::default()), rng: Rng::new(3), splats: Splats::default() };
     let (mut worst, mut short) = (0f64, 0);
     let error = |image: &Image| image.layers[0].data.iter().map(|v| f64::from((v - 1.0).abs())).fold(0.0, f64::max);
     for (desc, tile_size) in filters().flat_map(|desc| [1, 7, 64].map(|size| (desc, size))) {
         filtering.filter = Filter::new(&desc);
         for crop in [Crop::full([20, 13]), Crop { x: 3, y: 5, width: 11, height: 7 }] {
             for _ in 0..effort.pick(1, 40) {
-                let mut film = film(FilmShape { filter: desc, ..FilmShape::new([20, 13], crop, LayerSet::COLOR) }, tile_size);
+                let mut film =
+                    film(FilmShape { filter: desc, ..FilmShape::new([20, 13], crop, LayerSet::COLOR) }, tile_size);
                 for tile in film.tiles_mut() {
                     for pixel in 0..tile.size().iter().product::<u32>() as usize {
                         for sample in 0..(1 + pixel as u32 % 5) {
@@ -117,7 +125,11 @@ fn m3_constants(effort: Effort) -> Outcome {
                 scene["film"]["crop"] = crop;
             }
             let image = render(&scene);
-            rendered = image.layers[0].pixels().flat_map(|p| &p[..3]).map(|v| f64::from((v - 1.0).abs())).fold(rendered, f64::max);
+            rendered = image.layers[0]
+                .pixels()
+                .flat_map(|p| &p[..3])
+                .map(|v| f64::from((v - 1.0).abs()))
+                .fold(rendered, f64::max);
         }
     }
     Outcome::new().at_most("error of films", worst, 2e-6).none("pictures without all of their pixels", short).at_most(
@@ -133,13 +145,18 @@ fn lively_scene() -> Value {
         "film": { "width": 75, "height": 50 },
         "camera": { "position": [0, 1.2, 4], "look_at": [0, 0.5, 0], "lens": { "radius": 0.05, "focus_distance": 4 } },
         "sampler": { "spp": 7 },
-        "materials": { "glass": { "type": "dielectric" }, "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 } },
+        "materials": {
+            "glass": { "type": "dielectric" }, "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 }
+        },
         "shapes": [
             { "type": "quad", "origin": [-4, 0, 4], "edge_u": [8, 0, 0], "edge_v": [0, 0, -8] },
             { "type": "sphere", "material": "glass", "radius": 0.5, "transform": [{ "translate": [-0.6, 0.5, 0] }] },
             { "type": "cube", "material": "gold", "transform": [{ "scale": 0.4 }, { "translate": [0.7, 0.4, -0.3] }] }
         ],
-        "lights": [{ "type": "environment", "radiance": [0.2, 0.3, 0.4] }, { "type": "point", "position": [1, 3, 1], "intensity": [5, 5, 5] }]
+        "lights": [
+            { "type": "environment", "radiance": [0.2, 0.3, 0.4] },
+            { "type": "point", "position": [1, 3, 1], "intensity": [5, 5, 5] }
+        ]
     })
 }
 
@@ -150,7 +167,8 @@ fn bytes(image: &Image) -> Vec<u8> {
 
 /// A film whose tiles are filled in this order, each sample in that of its index.
 fn filled(order: &[usize], desc: &FilterDesc) -> Film {
-    let mut film = film(FilmShape { filter: *desc, ..FilmShape::new([40, 30], Crop::full([40, 30]), LayerSet::FULL) }, 8);
+    let mut film =
+        film(FilmShape { filter: *desc, ..FilmShape::new([40, 30], Crop::full([40, 30]), LayerSet::FULL) }, 8);
     let mut filtering = Filtering { filter: Filter::new(desc), rng: Rng::new(0), splats: Splats::default() };
     for &tile in order {
         // Films of shared samples have more.
@@ -255,7 +273,8 @@ fn m6_spoilt_samples(effort: Effort) -> Outcome {
             for sample in 0..effort.pick(50, 20_000) {
                 if rng.below(4) == 0 {
                     let (value, surface, weight) = spoilt(&mut rng);
-                    let value = Sample { pixel: &value, surface: Some(&surface), light_aovs: LightAovSample::default() };
+                    let value =
+                        Sample { pixel: &value, surface: Some(&surface), light_aovs: LightAovSample::default() };
                     bad += 1;
                     taken += usize::from(tile.add(pixel, sample, value, weight));
                 } else {
@@ -278,6 +297,8 @@ fn m6_spoilt_samples(effort: Effort) -> Outcome {
         .none("pixels that are not the mean of their good samples", wrong)
         .none("first dropped samples without a place to replay", usize::from(!replayable))
         .record("mean of samples -1 and 3, kept as they are", mean_by_film([-1.0, 3.0].into_iter()))
-        .short("negative samples are kept, where the catalogue requires them to be dropped: images of an environment may hold negative numbers, as those \
-                from wide gamuts do, and a mean without them would be biased")
+        .short(
+            "negative samples are kept, where the catalogue requires them to be dropped: images of an environment may \
+             hold negative numbers, as those from wide gamuts do, and a mean without them would be biased",
+        )
 }

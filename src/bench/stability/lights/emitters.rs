@@ -4,7 +4,9 @@ use std::f64::consts::TAU;
 
 use super::{Effort, Outcome, TWO_SIDED, Tests, first_light, place, skew, target};
 use crate::bench::stability::geometry::{meshes, triangle};
-use crate::geometry::{Analytic, Disk, Frustum, Geometry, Profile, Quad, Revolution, Shape, Sphere, SurfaceInteraction};
+use crate::geometry::{
+    Analytic, Disk, Frustum, Geometry, Profile, Quad, Revolution, Shape, Sphere, SurfaceInteraction,
+};
 use crate::id::{PrimId, ShapeId};
 use crate::light::AreaLight;
 use crate::math::float::step_past;
@@ -60,7 +62,8 @@ fn below(z: f64, height: f64, low: f64, high: f64) -> f64 {
 }
 
 fn emitters() -> Vec<Emitter> {
-    let revolution = Profile::bezier(&STRAIGHT).and_then(|profile| Revolution::new(&profile, 3.5)).expect("a valid profile");
+    let revolution =
+        Profile::bezier(&STRAIGHT).and_then(|profile| Revolution::new(&profile, 3.5)).expect("a valid profile");
     let quad = Quad::new(DVec3::new(-0.5, -0.3, 0.2), DVec3::new(1.0, 0.2, 0.0), DVec3::Y).expect("a valid quad");
     let valid = "valid limits";
     vec![
@@ -103,7 +106,9 @@ fn emitters() -> Vec<Emitter> {
         Emitter {
             name: "revolution sector",
             shape: Analytic::Revolution(revolution),
-            outside: |p| (rho(about_z(p)) - 0.3 - 0.5 * p.y).abs().max(beyond(p.y, 0.0, 1.2)).max(beyond_turn(about_z(p), 3.5)),
+            outside: |p| {
+                (rho(about_z(p)) - 0.3 - 0.5 * p.y).abs().max(beyond(p.y, 0.0, 1.2)).max(beyond_turn(about_z(p), 3.5))
+            },
             parts: |p| [below(p.y, 1.2, 0.3, 0.9), phi(about_z(p)) / 3.5],
         },
         Emitter {
@@ -152,7 +157,8 @@ impl View<'_> {
                     sum += f64::from(self.light.pdf(self.geometry, self.p, &ray, &at));
                 }
             }
-            let u = [(i % n) as f32 + rng.unit_f32(), (i / n) as f32 + rng.unit_f32()].map(|u| (u / n as f32).min(1.0 - f32::EPSILON));
+            let u = [(i % n) as f32 + rng.unit_f32(), (i / n) as f32 + rng.unit_f32()]
+                .map(|u| (u / n as f32).min(1.0 - f32::EPSILON));
             if let Some(s) = self.light.sample(self.geometry, &[], self.p, u)
                 && let crate::light::ShadowTarget::Point(target) = &s.target
             {

@@ -28,30 +28,33 @@ use tables::l9_tables;
 
 checks! {
     "L1" l1_power "power of every light":
-        "closed forms of points, spots, measured lights, every shape, suns and skies against what flows through a sphere around them \
-         (pbrt, lights_test; relative, since powers differ by orders of magnitude)";
+        "closed forms of points, spots, measured lights, every shape, suns and skies against what flows through a \
+         sphere around them (pbrt, lights_test; relative, since powers differ by orders of magnitude)";
     "L2" l2_solid_angles "solid angle of a sphere":
-        "mean inverse density on a grid from 1.0001 to 1e7 radii, 1 % above the surface, on it and inside (pbrt-v3, shapes Sphere.SolidAngle)";
+        "mean inverse density on a grid from 1.0001 to 1e7 radii, 1 % above the surface, on it and inside (pbrt-v3, \
+         shapes Sphere.SolidAngle)";
     "L3" l3_far_spheres "density towards a far sphere":
         "one over the solid angle by half-angles in f64, without 1 - cos, 1.0001 to 1e7 radii from the centre";
     "L4" l4_directions "directions towards a sphere":
-        "10 x 10 grid against the cone's formula and against the hit that a ray finds (Mitsuba 3, test_sphere test05_sample_direct); and random \
-         directions in 16 x 16 equal parts of the cone";
+        "10 x 10 grid against the cone's formula and against the hit that a ray finds (Mitsuba 3, test_sphere \
+         test05_sample_direct); and random directions in 16 x 16 equal parts of the cone";
     "L5" l5_partial_emitters "partial emitters":
-        "disk, ring sector, partial sphere, cylinder, cone, frustum, surface of revolution, triangle and sheared quad, turned and stretched: \
-         clips, parts of equal area, the integral of the density over directions without silhouettes, hits of samples";
+        "disk, ring sector, partial sphere, cylinder, cone, frustum, surface of revolution, triangle and sheared quad, \
+         turned and stretched: clips, parts of equal area, the integral of the density over directions without \
+         silhouettes, hits of samples";
     "L6" l6_polygons "rectangles and triangles":
-        "solid angle by closed form, irradiance by Lambert's formula, cells of a rectangle by their solid angle, from above, aside, far and \
-         almost within the plane (pbrt, sampling_test)";
+        "solid angle by closed form, irradiance by Lambert's formula, cells of a rectangle by their solid angle, from \
+         above, aside, far and almost within the plane (pbrt, sampling_test)";
     "L7" l7_environment_maps "environment maps":
-        "one texel, a constant in high resolution, 3 x 2, a ramp, a sun, lit poles and a lit seam: cells of the density, all directions \
-         together, weights, a ramp, seam and poles (Mitsuba 3, test_envmap)";
+        "one texel, a constant in high resolution, 3 x 2, a ramp, a sun, lit poles and a lit seam: cells of the \
+         density, all directions together, weights, a ramp, seam and poles (Mitsuba 3, test_envmap)";
     "L8" l8_choice "choice of a light":
-        "58 lights of every kind, with a sky and without, by power and by the tree, and 100 points that reach everywhere: sums, probabilities told \
-         and asked for, frequencies, the mean of 1 / (n p) (pbrt, lightsamplers_test)";
+        "58 lights of every kind, with a sky and without, by power and by the tree, and 100 points that reach \
+         everywhere: sums, probabilities told and asked for, frequencies, the mean of 1 / (n p) (pbrt, \
+         lightsamplers_test)";
     "L9" l9_tables "discrete distributions":
-        "alias tables and piecewise constant densities with zeros: frequencies, first and last random number, what is left of it (pbrt, \
-         sampling_test)";
+        "alias tables and piecewise constant densities with zeros: frequencies, first and last random number, what is \
+         left of it (pbrt, sampling_test)";
 }
 
 /// White, one side.

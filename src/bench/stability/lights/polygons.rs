@@ -72,7 +72,9 @@ fn irradiances(side: u32) -> f64 {
         let (geometry, light) = quad_light(corner, u, v);
         compare(&geometry, &light, &[corner, corner + u, corner + u + v, corner + v], DVec3::Z);
     }
-    for corners in [[[-0.3, -0.5, 1.0], [0.7, -0.5, 1.0], [0.7, 0.5, 1.2]], [[1.0, 2.0, 0.3], [-2.0, 1.0, 0.5], [0.0, -1.0, 2.0]]] {
+    for corners in
+        [[[-0.3, -0.5, 1.0], [0.7, -0.5, 1.0], [0.7, 0.5, 1.2]], [[1.0, 2.0, 0.3], [-2.0, 1.0, 0.5], [0.0, -1.0, 2.0]]]
+    {
         let corners = corners.map(DVec3::from);
         let geometry = meshes(vec![triangle(corners[0], corners[1], corners[2])]);
         compare(&geometry, &first_light(&geometry, TWO_SIDED), &corners, DVec3::Z);

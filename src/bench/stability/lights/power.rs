@@ -7,7 +7,9 @@ use super::{Effort, Outcome, TWO_SIDED, WHITE, first_light, place, quasi_random,
 use crate::bench::stability::geometry::{all_analytic_shapes, meshes, triangle};
 use crate::color::Rgb;
 use crate::geometry::{Analytic, Geometry, Profile, Revolution};
-use crate::light::{DirectionalLight, Environment, EnvironmentMap, IesLight, IesProfile, Light, MisCompensation, PointLight, SpotLight};
+use crate::light::{
+    DirectionalLight, Environment, EnvironmentMap, IesLight, IesProfile, Light, MisCompensation, PointLight, SpotLight,
+};
 use crate::math::{DMat3, DVec3};
 
 /// Where lamps stand, and around which their light is gathered.
@@ -38,7 +40,9 @@ fn flux(lamp: &Lamp, count: u32) -> f64 {
     for [a, b, c, d] in quasi_random(count) {
         let outward = direction([a, b]);
         let p = CENTER + outward * REACH;
-        let Some(s) = lamp.light.sample(&lamp.geometry, &[], p, [c as f32, d as f32], MisCompensation::Off) else { continue };
+        let Some(s) = lamp.light.sample(&lamp.geometry, &[], p, [c as f32, d as f32], MisCompensation::Off) else {
+            continue;
+        };
         let cos = outward.dot(s.wi.as_dvec3());
         let cos = if at_infinity { cos.max(0.0) } else { -cos };
         sum += f64::from(s.radiance.luminance()) * cos / f64::from(s.pdf);
@@ -90,7 +94,12 @@ fn shapes() -> Vec<Lamp> {
                 continue;
             }
             let light = Light::Area(first_light(&geometry, emission));
-            lamps.push(Lamp { name: format!("{name}, {sides} sides"), geometry: geometry.clone(), light, exact: sides * exact });
+            lamps.push(Lamp {
+                name: format!("{name}, {sides} sides"),
+                geometry: geometry.clone(),
+                light,
+                exact: sides * exact,
+            });
         }
     }
     let [a, b, c] = [DVec3::X, DVec3::new(0.1, 1.2, 0.0), DVec3::new(-0.5, 0.2, 0.9)];
@@ -130,8 +139,12 @@ fn points() -> Vec<Lamp> {
 
 /// Scenes as large as the sphere that gathers light: what falls on it is the fluence times its cross-section.
 fn at_infinity() -> Vec<Lamp> {
-    let lamp =
-        |name: String, light: Light, fluence: f64| Lamp { name, geometry: Geometry::default(), light, exact: PI * REACH * REACH * fluence };
+    let lamp = |name: String, light: Light, fluence: f64| Lamp {
+        name,
+        geometry: Geometry::default(),
+        light,
+        exact: PI * REACH * REACH * fluence,
+    };
     let sun = |angle: f64| DirectionalLight::new(DVec3::new(0.3, -0.8, 0.2), Rgb::splat(2.0), f64::to_radians(angle));
     let mut lamps = vec![lamp("sharp sun".into(), Light::Directional(Box::new(sun(0.0))), 2.0)];
     let constant = Environment::Constant(Rgb::splat(0.5));
@@ -177,5 +190,8 @@ pub(super) fn l1_power(effort: Effort) -> Outcome {
     Outcome::new()
         .at_most(format!("relative error of closed forms ({})", closed.1), closed.0, 1e-6)
         .at_most(format!("relative error of the flux ({})", flow.1), flow.0, effort.pick(1e-2, 3e-3))
-        .record("relative error of the power of a map of 6 x 4 texels, which only weighs it against other lights", gathered)
+        .record(
+            "relative error of the power of a map of 6 x 4 texels, which only weighs it against other lights",
+            gathered,
+        )
 }

@@ -8,8 +8,8 @@ use crate::color::Rgb;
 use crate::geometry::{Analytic, Disk, Geometry, Quad, Shape, Sphere, TransformedShape};
 use crate::id::{LightId, ShapeId};
 use crate::light::{
-    AreaLight, Emission, Environment, IesLight, IesProfile, Light, LightSampleContext, LightSelection, LightSet, MisCompensation,
-    PointLight, SpotLight,
+    AreaLight, Emission, Environment, IesLight, IesProfile, Light, LightSampleContext, LightSelection, LightSet,
+    MisCompensation, PointLight, SpotLight,
 };
 use crate::math::{DMat3, DVec3, Rng, Vec3};
 
@@ -42,7 +42,9 @@ fn cloud(seed: u64, sky: bool, selection: LightSelection) -> LightSet {
     geometry.shapes.push(Shape::Mesh(mesh(&corners, triangles)));
     let shape = ShapeId::new(geometry.shapes.len() - 1);
     geometry.world.push(shape);
-    lights.extend(AreaLight::for_shape(shape, Emission::constant(Rgb::WHITE), &geometry, &[]).into_iter().map(Light::Area));
+    lights.extend(
+        AreaLight::for_shape(shape, Emission::constant(Rgb::WHITE), &geometry, &[]).into_iter().map(Light::Area),
+    );
     for i in 0..6u8 {
         let (p, q, k) = (2.0 * rng.cube(), rng.direction(), f64::from(i));
         let intensity = Rgb::splat(0.01 * f32::from(i + 1));
@@ -61,7 +63,8 @@ fn cloud(seed: u64, sky: bool, selection: LightSelection) -> LightSet {
 
 /// Lights whose light reaches every point.
 fn points(rng: &mut Rng) -> LightSet {
-    let point = |_| Light::Point(PointLight { position: 3.0 * rng.direction(), intensity: Rgb::splat(1.0 + rng.unit_f32()) });
+    let point =
+        |_| Light::Point(PointLight { position: 3.0 * rng.direction(), intensity: Rgb::splat(1.0 + rng.unit_f32()) });
     LightSet::with_selection((0..100).map(point).collect(), &Geometry::default(), LightSelection::Tree)
 }
 
@@ -146,7 +149,8 @@ pub(super) fn l8_choice(effort: Effort) -> Outcome {
                 let found = choose(&set, &from, &probabilities, count, &mut rng);
                 difference = difference.max(found.difference);
                 let none = (1.0 - probabilities.iter().sum::<f64>()).max(0.0);
-                let expected: Vec<f64> = probabilities.iter().copied().chain([none]).map(|p| p * f64::from(count)).collect();
+                let expected: Vec<f64> =
+                    probabilities.iter().copied().chain([none]).map(|p| p * f64::from(count)).collect();
                 tests.counts(&format!("{name}, {sky}, from {k}"), &found.counts, &expected);
                 if selection == LightSelection::Power {
                     tests.deviations(&format!("1 / (n p), {sky}, from {k}"), found.z);

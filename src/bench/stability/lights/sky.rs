@@ -138,7 +138,8 @@ fn lookups() -> [f64; 3] {
 /// there is light.
 fn bad_corners() -> usize {
     let sky = Sky::new("corners", [16, 8], DMat3::IDENTITY, |x, y| (1 + x + y) as f32);
-    let near_poles = [Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z, Vec3::X, Vec3::new(1e-20, 1.0, 0.0), Vec3::new(0.0, -1.0, -1e-30)];
+    let near_poles =
+        [Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z, Vec3::X, Vec3::new(1e-20, 1.0, 0.0), Vec3::new(0.0, -1.0, -1e-30)];
     let corners = (0..=8).flat_map(|y| (0..=16).map(move |x| (f64::from(x) / 16.0, PI * f64::from(y) / 8.0)));
     let directions = near_poles.into_iter().chain(corners.map(|(u, theta)| sky.direction(u, theta)));
     directions
@@ -177,7 +178,11 @@ pub(super) fn l7_environment_maps(effort: Effort) -> Outcome {
         .at_most("spread of the weights of a constant", constant, 1e-5)
         .at_most("largest weight over the mean", bounded, 4.1)
         .at_most("share of samples with another density than their direction", strays, 1e-3)
-        .at_most("difference of radiance between samples and their direction, in parts of the brightest texel", radiance, 1e-4)
+        .at_most(
+            "difference of radiance between samples and their direction, in parts of the brightest texel",
+            radiance,
+            1e-4,
+        )
         .at_most("shift of a ramp, in texels", shift, 1e-4)
         .at_most("step at the seam", seam, 5e-3)
         .at_most("step next to the poles", pole, 5e-3)

@@ -93,7 +93,10 @@ pub(super) fn l3_far_spheres(effort: Effort) -> Outcome {
         floor: 1e-10,
         curves: vec![("sample".into(), curve)],
     };
-    Outcome::new().at_most("relative error of samples", samples, 1e-6).at_most("relative error of hits", hits, 1e-6).plot(plot)
+    Outcome::new()
+        .at_most("relative error of samples", samples, 1e-6)
+        .at_most("relative error of hits", hits, 1e-6)
+        .plot(plot)
 }
 
 pub(super) fn l4_directions(effort: Effort) -> Outcome {

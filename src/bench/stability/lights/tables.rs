@@ -73,7 +73,8 @@ pub(super) fn l9_tables(effort: Effort) -> Outcome {
     // Densities over the square: counts of cells, and none of weight zero at the ends of the unit interval.
     let (mut tests, mut rng, mut cells) = (Tests::new(), Rng::new(5), 0f64);
     for (width, height) in [(1, 1), (7, 3), (64, 33)] {
-        let weights: Vec<f32> = (0..width * height).map(|i| if i % 3 == 1 { 0.0 } else { rng.magnitude(-3.0, 1.0) as f32 }).collect();
+        let weights: Vec<f32> =
+            (0..width * height).map(|i| if i % 3 == 1 { 0.0 } else { rng.magnitude(-3.0, 1.0) as f32 }).collect();
         let Some(density) = Piecewise2d::new(width, height, &weights) else { return Outcome::new() };
         let total: f64 = weights.iter().map(|w| f64::from(*w)).sum();
         let count = effort.pick(100_000, 10_000_000);

@@ -25,14 +25,20 @@ fn compare(a: &Renders, b: &Renders) -> Agreement {
     let level = 1.0 - 0.99f64.powf(1.0 / PIXELS as f64);
     let (mut accepted, mut histogram) = (0, vec![0u32; 16]);
     for pixel in 0..PIXELS {
-        let [at_a, at_b] = [a, b].map(|renders| estimate(&renders.iter().map(|picture| picture[pixel]).collect::<Vec<_>>()));
+        let [at_a, at_b] =
+            [a, b].map(|renders| estimate(&renders.iter().map(|picture| picture[pixel]).collect::<Vec<_>>()));
         let p_value = welch(at_a, a.len(), at_b, b.len(), 0.0);
         accepted += usize::from(p_value > level);
         histogram[((p_value * 16.0) as usize).min(15)] += 1;
     }
-    let [all_a, all_b] =
-        [a, b].map(|renders| estimate(&renders.iter().map(|picture| picture.iter().sum::<f64>() / PIXELS as f64).collect::<Vec<_>>()));
-    Agreement { accepted: accepted as f64 / PIXELS as f64, whole: welch(all_a, a.len(), all_b, b.len(), 0.0), histogram }
+    let [all_a, all_b] = [a, b].map(|renders| {
+        estimate(&renders.iter().map(|picture| picture.iter().sum::<f64>() / PIXELS as f64).collect::<Vec<_>>())
+    });
+    Agreement {
+        accepted: accepted as f64 / PIXELS as f64,
+        whole: welch(all_a, a.len(), all_b, b.len(), 0.0),
+        histogram,
+    }
 }
 
 /// How many renders of how many samples a reference has, and one to be tested.
@@ -73,7 +79,9 @@ pub(super) fn r3_power(effort: Effort) -> Outcome {
     let mut deeper = room();
     deeper["integrator"]["max_depth"] = json!(5);
     let mut outcome = Outcome::new();
-    for (what, scene) in [("a lamp 1 % brighter", brighter), ("albedo 0.505 in place of 0.5", whiter), ("one segment more", deeper)] {
+    for (what, scene) in
+        [("a lamp 1 % brighter", brighter), ("albedo 0.505 in place of 0.5", whiter), ("one segment more", deeper)]
+    {
         let found = compare(&reference, &pictures(prepared(&scene, size.spp), 2000..2000 + size.tested));
         outcome = outcome.at_most(format!("p-value of {what}"), found.whole, 1e-6);
     }

@@ -7,7 +7,8 @@ use crate::bench::stability::Plot;
 /// Relative squared error of a picture: over all pixels, and without the largest thousandth.
 fn relative_errors(picture: &[f64], reference: &[f64]) -> [f64; 2] {
     let mean = reference.iter().sum::<f64>() / reference.len() as f64;
-    let mut errors: Vec<f64> = picture.iter().zip(reference).map(|(x, r)| (x - r).powi(2) / (r * r + 1e-2 * mean * mean)).collect();
+    let mut errors: Vec<f64> =
+        picture.iter().zip(reference).map(|(x, r)| (x - r).powi(2) / (r * r + 1e-2 * mean * mean)).collect();
     errors.sort_by(f64::total_cmp);
     let kept = errors.len() - errors.len().div_ceil(1000);
     let over = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
@@ -28,7 +29,10 @@ impl Curve {
             let mut scene = room();
             scene["sampler"]["type"] = json!(sampler);
             let renders = pictures(prepared(&scene, spp), (0..seeds).map(|seed| 5000 + 100 * u64::from(level) + seed));
-            let sums = renders.iter().map(|picture| relative_errors(picture, reference)).fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+            let sums = renders
+                .iter()
+                .map(|picture| relative_errors(picture, reference))
+                .fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
             curve.all.push((f64::from(spp), sums[0] / seeds as f64));
             curve.without_largest.push((f64::from(spp), sums[1] / seeds as f64));
         }

@@ -55,7 +55,8 @@ fn fireflies(image: &Image) -> Vec<bool> {
 fn examine(desc: &crate::desc::SceneDesc, path: &Path, effort: Effort) -> Result<Found> {
     let (side, spp) = effort.pick((32, 16), (64, 64));
     let scene = compile::compile(desc, path)?;
-    let overrides = Overrides { size: Some([side; 2]), spp: Some(spp), threads: Some(2), seed: Some(1), ..Overrides::default() };
+    let overrides =
+        Overrides { size: Some([side; 2]), spp: Some(spp), threads: Some(2), seed: Some(1), ..Overrides::default() };
     let mut prepared = Prepared { scene, settings: Settings::new(desc, &overrides)? };
     let caustics = prepared.scene.features.delta_materials;
     let mut found = Found { pixels: (side * side) as usize, caustics, ..Found::default() };
@@ -77,7 +78,8 @@ type Scenes = Vec<(String, Result<Found>)>;
 /// The scenes of the folder `scenes`, if it is there, but those whose meshes a script would have to fetch.
 fn from_folder(effort: Effort) -> Scenes {
     let entries = fs::read_dir("scenes").into_iter().flatten().flatten();
-    let mut paths: Vec<_> = entries.map(|entry| entry.path()).filter(|path| path.extension().is_some_and(|e| e == "json")).collect();
+    let mut paths: Vec<_> =
+        entries.map(|entry| entry.path()).filter(|path| path.extension().is_some_and(|e| e == "json")).collect();
     paths.sort();
     let name = |path: &Path| path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     let found = |path: &Path| import::load_scene(path).and_then(|desc| examine(&desc, path, effort));
@@ -98,7 +100,8 @@ pub(super) fn r8_gallery(effort: Effort) -> Outcome {
         scenes = built_in(effort);
     }
     let all = scenes.len();
-    let scenes: Vec<(String, Found)> = scenes.into_iter().filter_map(|(name, found)| Some((name, found.ok()?))).collect();
+    let scenes: Vec<(String, Found)> =
+        scenes.into_iter().filter_map(|(name, found)| Some((name, found.ok()?))).collect();
     let invalid: u64 = scenes.iter().map(|(_, found)| found.invalid).sum();
     let share = |found: &Found| found.fireflies as f64 / found.pixels as f64;
     let mut outcome = Outcome::new()
@@ -108,7 +111,8 @@ pub(super) fn r8_gallery(effort: Effort) -> Outcome {
         .at_most("samples and pixels that are not finite", invalid as f64, 0.0);
     // What R5 leaves out of its error too: a thousandth.
     for (caustics, what) in [(false, "without mirrors and smooth glass"), (true, "with them")] {
-        let shares: Vec<f64> = scenes.iter().filter(|(_, found)| found.caustics == caustics).map(|(_, found)| share(found)).collect();
+        let shares: Vec<f64> =
+            scenes.iter().filter(|(_, found)| found.caustics == caustics).map(|(_, found)| share(found)).collect();
         let mean = shares.iter().sum::<f64>() / shares.len().max(1) as f64;
         let what = format!("share of pixels that are fireflies, {} scenes {what}", shares.len());
         outcome = if caustics { outcome.record(what, mean) } else { outcome.at_most(what, mean, 1e-3) };

@@ -21,19 +21,21 @@ use needs::r7_pay_for_use;
 
 checks! {
     "R1" r1_agreement "independent renders of one scene agree":
-        "a room of 32 x 32 pixels, mean and variance by renders with other seeds: each pixel by Welch's test, 99.75 % of them within Šidák's level of \
-         1 %, p-values uniform, the whole picture (Mitsuba 3, test_renders; against other renders of Steradian: Mitsuba's are compared by \
-         xtask/src/compare_refs)";
+        "a room of 32 x 32 pixels, mean and variance by renders with other seeds: each pixel by Welch's test, 99.75 % \
+         of them within Šidák's level of 1 %, p-values uniform, the whole picture (Mitsuba 3, test_renders; against \
+         other renders of Steradian: Mitsuba's are compared by xtask/src/compare_refs)";
     "R3" r3_power "power of that test":
-        "the same room with a lamp 1 % brighter, one material 1 % whiter, paths one segment longer: each must be rejected";
+        "the same room with a lamp 1 % brighter, one material 1 % whiter, paths one segment longer: each must be \
+         rejected";
     "R5" r5_convergence "error against samples":
-        "relative squared error of the room for 1, 2, 4, ... samples a pixel against many Sobol samples: falls as 1 / n (with and without the \
-         largest thousandth of pixels)";
+        "relative squared error of the room for 1, 2, 4, ... samples a pixel against many Sobol samples: falls as 1 / \
+         n (with and without the largest thousandth of pixels)";
     "R7" r7_pay_for_use "nothing is paid for that is not used":
-        "what triangles at rest without holes and each feature alone register with Embree, and rays of pictures that need no second one";
+        "what triangles at rest without holes and each feature alone register with Embree, and rays of pictures that \
+         need no second one";
     "R8" r8_gallery "gallery":
-        "every scene of the folder scenes if it is there, else cornell, glass and phi_max, small, with two seeds: numbers that are not finite, \
-         pixels above 20 times the median of the 24 around them in one of both pictures";
+        "every scene of the folder scenes if it is there, else cornell, glass and phi_max, small, with two seeds: \
+         numbers that are not finite, pixels above 20 times the median of the 24 around them in one of both pictures";
 }
 
 /// Width and height of pictures: one tile.
@@ -54,7 +56,11 @@ fn scene(rest: Value) -> Value {
 
 /// A room with a lamp that fills its ceiling, and two balls; paths of up to four segments.
 fn room() -> Value {
-    let wall = |origin: [f64; 3], u: [f64; 3], v: [f64; 3]| json!({ "type": "quad", "material": "grey", "origin": origin, "edge_u": u, "edge_v": v });
+    let wall = |origin: [f64; 3], u: [f64; 3], v: [f64; 3]| {
+        json!({
+            "type": "quad", "material": "grey", "origin": origin, "edge_u": u, "edge_v": v
+        })
+    };
     let mut lamp = wall([-1.0, 1.0, -1.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0]);
     lamp["emission"] = json!({ "radiance": [5, 4, 3] });
     scene(json!({
@@ -70,7 +76,9 @@ fn room() -> Value {
             wall([-1.0, -1.0, -1.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]),
             wall([-1.0, -1.0, 1.0], [0.0, 0.0, -2.0], [0.0, 2.0, 0.0]),
             wall([1.0, -1.0, -1.0], [0.0, 0.0, 2.0], [0.0, 2.0, 0.0]),
-            { "type": "sphere", "material": "metal", "radius": 0.4, "transform": [{ "translate": [-0.4, -0.6, -0.2] }] },
+            {
+                "type": "sphere", "material": "metal", "radius": 0.4, "transform": [{ "translate": [-0.4, -0.6, -0.2] }]
+            },
             lamp,
             { "type": "sphere", "material": "clay", "radius": 0.35, "transform": [{ "translate": [0.45, -0.65, 0.2] }] }
         ]

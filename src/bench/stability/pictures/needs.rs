@@ -7,8 +7,9 @@ use crate::render::Overrides;
 
 /// A triangle, at rest and without holes, in the world and in an instance.
 fn plain() -> Value {
-    let triangle =
-        json!({ "type": "mesh", "material": "grey", "positions": [[-1, -1, 0], [1, -1, 0], [0, 1, 0]], "triangles": [[0, 1, 2]] });
+    let triangle = json!({
+        "type": "mesh", "material": "grey", "positions": [[-1, -1, 0], [1, -1, 0], [0, 1, 0]], "triangles": [[0, 1, 2]]
+    });
     scene(json!({
         "sampler": { "spp": 1 },
         "integrator": { "type": "normal" },
@@ -24,7 +25,11 @@ fn registered(scene: &Value) -> (Registered, [bool; 5]) {
     let prepared = prepare(scene, &Overrides::default());
     let features = &prepared.scene.features;
     let used = [features.motion, features.analytic_shapes, features.textures, features.media, features.lens];
-    (EmbreeAccel::new(&prepared.scene.geometry, 1).map_or_else(|_| Registered::default(), |accel| accel.registered()), used)
+    (
+        EmbreeAccel::new(&prepared.scene.geometry, 1)
+            .map_or_else(|_| Registered::default(), |accel| accel.registered()),
+        used,
+    )
 }
 
 /// Rays of one picture beside those of the camera.

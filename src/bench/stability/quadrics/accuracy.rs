@@ -13,8 +13,10 @@ use crate::math::{Bounds, DMat3, DVec3, Ray, Transform, Vec3};
 const DISTANCES: [f64; 7] = [3.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6];
 const SCALES: [f64; 7] = [1e-6, 1e-4, 1e-2, 1.0, 1e2, 1e4, 1e6];
 
-const EMBREE_BOXES: &str = "Embree tests boxes of user geometry with an error of half a unit in the last place of the ray's origin; \
-    boxes are padded by a unit in the last place of their own bounds, so rays from afar are lost where they pass the edge of a box more closely than that; the catalogue requires none";
+const EMBREE_BOXES: &str = "Embree tests boxes of user geometry with an error of half a unit in the last place of the \
+                            ray's origin; boxes are padded by a unit in the last place of their own bounds, so rays \
+                            from afar are lost where they pass the edge of a box more closely than that; the catalogue \
+                            requires none";
 
 /// How a ray is made.
 #[derive(Clone, Copy)]
@@ -123,6 +125,39 @@ struct Tallies {
     among_at_rims: Tally,
 }
 
+impl Tallies {
+    fn merge(&mut self, other: &Self) {
+        self.alone.merge(&other.alone);
+        self.embree.merge(&other.embree);
+        self.among.merge(&other.among);
+        self.among_at_rims.merge(&other.among_at_rims);
+    }
+
+    /// With the judgements of C1 on them.
+    fn judged(&self, outcome: Outcome) -> Outcome {
+        let share = self.alone.undecidable as f64 / self.alone.rays as f64;
+        let lost_at_rims = self.among_at_rims.missed as f64 / self.among_at_rims.rays.max(1) as f64;
+        let error_through_embree = self.embree.error.max(self.among.error).max(self.among_at_rims.error);
+        let outcome = if self.among_at_rims.missed == 0 { outcome } else { outcome.short(EMBREE_BOXES) };
+        outcome
+            .none("missed", self.alone.missed)
+            .none("false hits", self.alone.invented)
+            .none("missed through Embree", self.embree.missed)
+            .none("missed through Embree among others", self.among.missed)
+            .at_most(
+                "share missed through Embree among others of rays that pass their box by less than 2^-20 of the \
+                 distance",
+                lost_at_rims,
+                0.05,
+            )
+            .none("false hits through Embree", self.embree.invented + self.among.invented + self.among_at_rims.invented)
+            .at_most("error through Embree", error_through_embree, 1.0)
+            .at_most("distance from the tangent plane in half-ulp boxes", self.alone.off_surface, 1.0)
+            .at_most("share of rays that cannot be decided", share, 1e-3)
+            .record("rays", self.alone.rays as f64)
+    }
+}
+
 /// Spheres behind the start of a ray, so that the accelerator has several boxes.
 fn bystanders(ray: &Ray, unit: f64) -> impl Iterator<Item = Shape> + '_ {
     let back = -ray.direction.as_dvec3().normalize();
@@ -205,48 +240,37 @@ pub(super) fn c1_hit_accuracy(effort: Effort) -> Outcome {
             for &setting in settings {
                 let found = compare(&mut rng, case, setting, rays, half_at_rims);
                 alone.merge(&found.alone);
-                all.alone.merge(&found.alone);
-                all.embree.merge(&found.embree);
-                all.among.merge(&found.among);
-                all.among_at_rims.merge(&found.among_at_rims);
+                all.merge(&found);
             }
             worst = worst.max(alone.error);
             alone.error
         };
         let base = Setting { distance: 10.0, offset: 0.0, scale: 1.0, is_turned: false };
-        let variants =
-            |s: Setting| [s, Setting { is_turned: true, ..s }, Setting { offset: 1e3, ..s }, Setting { offset: 1e3, is_turned: true, ..s }];
+        let variants = |s: Setting| {
+            [
+                s,
+                Setting { is_turned: true, ..s },
+                Setting { offset: 1e3, ..s },
+                Setting { offset: 1e3, is_turned: true, ..s },
+            ]
+        };
         let distances = DISTANCES.map(|distance| (distance, run(&variants(Setting { distance, ..base }))));
-        let scales =
-            SCALES.map(|scale| (scale, run(&[Setting { scale, ..base }, Setting { scale, is_turned: true, offset: 1e3, distance: 1e4 }])));
+        let scales = SCALES.map(|scale| {
+            (scale, run(&[Setting { scale, ..base }, Setting { scale, is_turned: true, offset: 1e3, distance: 1e4 }]))
+        });
         outcome = outcome.at_most(format!("{}: error of the point in 2^-24 max|p|", case.name), worst, 1.0);
         by_distance.push((case.name.to_string(), distances.to_vec()));
         by_scale.push((case.name.to_string(), scales.to_vec()));
     }
-    let naive = |settings: &dyn Fn(f64) -> Setting, xs: &[f64], case: &Case| naive_curve(settings, xs, case, effort.pick(300, 5_000));
+    let naive = |settings: &dyn Fn(f64) -> Setting, xs: &[f64], case: &Case| {
+        naive_curve(settings, xs, case, effort.pick(300, 5_000))
+    };
     for case in &cases[..2] {
         let base = Setting { distance: 10.0, offset: 0.0, scale: 1.0, is_turned: false };
         by_distance.push(naive(&|distance| Setting { distance, ..base }, &DISTANCES, case));
         by_scale.push(naive(&|scale| Setting { scale, ..base }, &SCALES, case));
     }
-    let share = all.alone.undecidable as f64 / all.alone.rays as f64;
-    let lost_at_rims = all.among_at_rims.missed as f64 / all.among_at_rims.rays.max(1) as f64;
-    let outcome = if all.among_at_rims.missed == 0 { outcome } else { outcome.short(EMBREE_BOXES) };
-    outcome
-        .none("missed", all.alone.missed)
-        .none("false hits", all.alone.invented)
-        .none("missed through Embree", all.embree.missed)
-        .none("missed through Embree among others", all.among.missed)
-        .at_most(
-            "share missed through Embree among others of rays that pass their box by less than 2^-20 of the distance",
-            lost_at_rims,
-            0.05,
-        )
-        .none("false hits through Embree", all.embree.invented + all.among.invented + all.among_at_rims.invented)
-        .at_most("error through Embree", all.embree.error.max(all.among.error).max(all.among_at_rims.error), 1.0)
-        .at_most("distance from the tangent plane in half-ulp boxes", all.alone.off_surface, 1.0)
-        .at_most("share of rays that cannot be decided", share, 1e-3)
-        .record("rays", all.alone.rays as f64)
+    all.judged(outcome)
         .plot(error_plot("Error of hits by distance", "distance of the origin / size", by_distance))
         .plot(error_plot("Error of hits by scale", "size of the shape", by_scale))
 }
@@ -263,7 +287,8 @@ fn naive_error(rng: &mut Rng, case: &Case, setting: Setting, rays: usize) -> f64
         let d = ray.direction;
         let radius = (case.size.min(1.0) * setting.scale) as f32;
         let flat = |v: Vec3| if matches!(case.shape, Analytic::Sphere(_)) { v } else { Vec3::new(v.x, v.y, 0.0) };
-        let (a, b, c) = (flat(d).length_squared(), 2.0 * flat(o).dot(flat(d)), flat(o).length_squared() - radius * radius);
+        let (a, b, c) =
+            (flat(d).length_squared(), 2.0 * flat(o).dot(flat(d)), flat(o).length_squared() - radius * radius);
         let discriminant = b * b - 4.0 * a * c;
         if discriminant < 0.0 {
             continue;
@@ -300,7 +325,11 @@ pub fn compare_with_oracle(cases: &[Case], rays: usize, seed: u64) -> Agreement 
             }
         }
     }
-    Agreement { wrong: all.missed + all.invented, error: all.error, undecidable: all.undecidable as f64 / all.rays as f64 }
+    Agreement {
+        wrong: all.missed + all.invented,
+        error: all.error,
+        undecidable: all.undecidable as f64 / all.rays as f64,
+    }
 }
 
 pub(super) fn c7_partial_shapes(effort: Effort) -> Outcome {
@@ -354,8 +383,9 @@ pub(super) fn c13_stored_vectors(_: Effort) -> Outcome {
             }
             match (case.answer(&ExactTransform::new(&at), &ray, 0.0), hit) {
                 (Answer::Hit { t, p }, Some((exact_t, exact_p))) => {
-                    oracle_error =
-                        oracle_error.max((t / exact_t - 1.0).abs()).max((p - exact_p).abs().max_element() / exact_p.abs().max_element());
+                    oracle_error = oracle_error
+                        .max((t / exact_t - 1.0).abs())
+                        .max((p - exact_p).abs().max_element() / exact_p.abs().max_element());
                 }
                 (Answer::Miss, None) => {}
                 _ => oracle += 1,

@@ -7,7 +7,9 @@ use crate::accel::{self, AccelKind, Accelerator, Coherence, LinearAccel};
 use crate::bench::stability::geometry::{Rng, closest, ray_through, transform, world};
 use crate::bench::stability::oracle::{Answer, Case, ExactTransform, partial_cases, whole_cases};
 use crate::bench::stability::{Effort, Outcome};
-use crate::geometry::{Analytic, Disk, Frustum, Geometry, LocalSurface, Profile, Revolution, Shape, Sphere, TransformedShape};
+use crate::geometry::{
+    Analytic, Disk, Frustum, Geometry, LocalSurface, Profile, Revolution, Shape, Sphere, TransformedShape,
+};
 use crate::math::float::{F64_CHAIN_ERROR, UNIT_ROUNDOFF};
 use crate::math::{Bounds, DMat3, DVec3, Frame, Ray, RayF64, Transform, dvec3};
 
@@ -85,8 +87,11 @@ pub(super) fn c2_choice_of_root(effort: Effort) -> Outcome {
     // Exactly tangent: either answer, but a number.
     let mut not_numbers = 0;
     for shape in [&sphere, &cylinder] {
-        for (from, d) in [(dvec3(-5.0, 2.0, 0.0), DVec3::X), (dvec3(2.0, -5.0, 0.0), DVec3::Y), (dvec3(-2.0, 9.0, 0.0), -DVec3::Y)] {
-            not_numbers += usize::from(distance(shape, &Ray::new(from.as_vec3(), d.as_vec3())).is_some_and(|t| !t.is_finite()));
+        for (from, d) in
+            [(dvec3(-5.0, 2.0, 0.0), DVec3::X), (dvec3(2.0, -5.0, 0.0), DVec3::Y), (dvec3(-2.0, 9.0, 0.0), -DVec3::Y)]
+        {
+            not_numbers +=
+                usize::from(distance(shape, &Ray::new(from.as_vec3(), d.as_vec3())).is_some_and(|t| !t.is_finite()));
         }
     }
     // From within and from next to the surface.
@@ -136,7 +141,9 @@ pub(super) fn c3_grid_of_rays(effort: Effort) -> Outcome {
                     let inside = radius * radius - x * x - y * y;
                     if inside.abs() > 1e-8 {
                         rays += 1;
-                        wrong += usize::from(accel.intersect(&ray).is_some() != (inside > 0.0) || accel.occluded(&ray) != (inside > 0.0));
+                        wrong += usize::from(
+                            accel.intersect(&ray).is_some() != (inside > 0.0) || accel.occluded(&ray) != (inside > 0.0),
+                        );
                     }
                 }
             }
@@ -157,7 +164,8 @@ pub(super) fn c4_derivatives(effort: Effort) -> Outcome {
                 slope = slope.max(step.dot(s.n).abs() / step.length());
                 // To both sides, since on one of them may be a joint of a profile.
                 let eps = 1e-5;
-                let moved = [eps, -eps].map(|eps| hit_from_above(&shape, s.p + eps * step, s.n).map(|moved| (eps, moved)));
+                let moved =
+                    [eps, -eps].map(|eps| hit_from_above(&shape, s.p + eps * step, s.n).map(|moved| (eps, moved)));
                 let [Some(ahead), Some(behind)] = moved else { continue };
                 for (k, expected) in expected.iter().enumerate() {
                     let error = |(eps, moved): &(f64, LocalSurface)| ((moved.uv[k] - s.uv[k]) / eps - expected).abs();
@@ -216,13 +224,26 @@ pub(super) fn c5_parameters_round_trip(effort: Effort) -> Outcome {
             check(&vase(3.5), dvec3(at.x * sin, at.y, at.x * cos), uv);
         }
     }
-    Outcome::new().none("missed", missed).at_most("error of the point", place, 1e-5).at_most("error of u, v", parameters, 1e-5)
+    Outcome::new().none("missed", missed).at_most("error of the point", place, 1e-5).at_most(
+        "error of u, v",
+        parameters,
+        1e-5,
+    )
 }
 
 pub(super) fn c6_singularities(_: Effort) -> Outcome {
-    let directions =
-        [DVec3::Z, -DVec3::Z, DVec3::Y, -DVec3::Y, dvec3(0.3, -0.0, 1.0), dvec3(-0.0, 0.2, -1.0), DVec3::X, dvec3(1e-300, 0.0, 1.0)];
-    let points = [DVec3::ZERO, DVec3::Z, -DVec3::Z, 2.0 * DVec3::Z, 1.5 * DVec3::Z, 0.75 * DVec3::Z, DVec3::Y, -DVec3::Y];
+    let directions = [
+        DVec3::Z,
+        -DVec3::Z,
+        DVec3::Y,
+        -DVec3::Y,
+        dvec3(0.3, -0.0, 1.0),
+        dvec3(-0.0, 0.2, -1.0),
+        DVec3::X,
+        dvec3(1e-300, 0.0, 1.0),
+    ];
+    let points =
+        [DVec3::ZERO, DVec3::Z, -DVec3::Z, 2.0 * DVec3::Z, 1.5 * DVec3::Z, 0.75 * DVec3::Z, DVec3::Y, -DVec3::Y];
     let (mut broken, mut hits, mut unit, mut frame) = (0, 0usize, 0f64, 0f64);
     for (_, shape) in shapes() {
         for p in points {
@@ -232,7 +253,8 @@ pub(super) fn c6_singularities(_: Effort) -> Outcome {
                 let s = shape.surface(&ray, &hit);
                 hits += 1;
                 let finite = hit.t.is_finite() && s.p.is_finite() && s.dp_du.is_finite() && s.dp_dv.is_finite();
-                let in_range = s.uv.iter().all(|x| (0.0..=1.0).contains(x)) && s.pdf_area.is_finite() && s.pdf_area > 0.0;
+                let in_range =
+                    s.uv.iter().all(|x| (0.0..=1.0).contains(x)) && s.pdf_area.is_finite() && s.pdf_area > 0.0;
                 broken += usize::from(!(finite && in_range));
                 unit = unit.max((s.n.length() - 1.0).abs());
                 let Frame { x, y, z } = Frame::from_normal_and_tangent(s.n.as_vec3(), s.dp_du.as_vec3());
@@ -256,14 +278,18 @@ pub(super) fn c8_bounds(effort: Effort) -> Outcome {
     let mut rng = Rng::new(45);
     let (mut outside, mut excess, mut lack) = (0, 0f64, 0f64);
     let mut compare = |bounds: Bounds, tight: Bounds| {
-        let (over, under) = ((bounds.max - tight.max).max(tight.min - bounds.min), (tight.max - bounds.max).max(bounds.min - tight.min));
+        let (over, under) = (
+            (bounds.max - tight.max).max(tight.min - bounds.min),
+            (tight.max - bounds.max).max(bounds.min - tight.min),
+        );
         excess = excess.max(over.max_element());
         lack = lack.max(under.max_element());
     };
     for case in whole_cases().into_iter().chain(partial_cases()) {
         // The extremes of an arc are at its ends and where it crosses an axis.
         let phi_max = case.phi_max();
-        let turns = [0.0, 1.0].into_iter().chain((1..4).map(|k| f64::from(k) * FRAC_PI_2 / phi_max).filter(|u| *u < 1.0));
+        let turns =
+            [0.0, 1.0].into_iter().chain((1..4).map(|k| f64::from(k) * FRAC_PI_2 / phi_max).filter(|u| *u < 1.0));
         let mut tight = Bounds::EMPTY;
         for u in turns {
             for i in 0..=1_000 {
@@ -285,7 +311,8 @@ pub(super) fn c8_bounds(effort: Effort) -> Outcome {
     }
     let shear = DMat3::from_cols(dvec3(1.2, 0.1, 0.0), dvec3(0.4, 0.7, -0.3), dvec3(0.0, 0.5, 2.0));
     for (_, shape) in shapes() {
-        for (linear, translation) in [(DMat3::IDENTITY, DVec3::ZERO), (rng.rotation(), 1e4 * rng.cube()), (shear, dvec3(10.0, -3.0, 100.0))]
+        for (linear, translation) in
+            [(DMat3::IDENTITY, DVec3::ZERO), (rng.rotation(), 1e4 * rng.cube()), (shear, dvec3(10.0, -3.0, 100.0))]
         {
             let placed = TransformedShape::new(shape.clone(), transform(linear, translation));
             let padded = placed.bounds().padded();
@@ -313,7 +340,8 @@ pub(super) fn c9_both_queries_agree(effort: Effort) -> Outcome {
         let linear = LinearAccel::new(&geometry);
         let accels: [&dyn Accelerator; 2] = [&linear, &*embree];
         for i in 0..effort.pick(500, 20_000) {
-            let from = center + rng.direction() * if i % 3 == 0 { rng.range(0.0, 1.0) } else { rng.magnitude(0.5, 4.0) };
+            let from =
+                center + rng.direction() * if i % 3 == 0 { rng.range(0.0, 1.0) } else { rng.magnitude(0.5, 4.0) };
             let Shape::Analytic(on) = geometry.shape(crate::id::ShapeId(0)) else { continue };
             let target = on.transform.point(on.shape.sample([rng.unit(), rng.unit()]).p) + 0.1 * rng.cube();
             let ray = ray_through(from, target);
@@ -333,11 +361,15 @@ pub(super) fn c9_both_queries_agree(effort: Effort) -> Outcome {
                     let (mut batch, mut any) = ([None; 3], [false; 3]);
                     accel.intersect_batch(&[part; 3], &mut batch, Coherence::Incoherent);
                     accel.occluded_batch(&[part; 3], &mut any, Coherence::Incoherent);
-                    differ += usize::from(accel.occluded(&part) != hit.is_some() || batch != [hit; 3] || any != [hit.is_some(); 3]);
+                    differ += usize::from(
+                        accel.occluded(&part) != hit.is_some() || batch != [hit; 3] || any != [hit.is_some(); 3],
+                    );
                     late += usize::from(hit.is_some_and(|hit| hit.t > t_max || hit.t < t_min));
                     // One float beyond a hit or before it leaves it inside whatever its rounding.
                     let must = t_max == t.next_up() || t_min == t.next_down();
-                    lost += usize::from(must && hit.is_none_or(|hit| hit.t != t) || (t_max == t.next_down() && hit.is_some()));
+                    lost += usize::from(
+                        must && hit.is_none_or(|hit| hit.t != t) || (t_max == t.next_down() && hit.is_some()),
+                    );
                 }
             }
         }
@@ -349,27 +381,39 @@ pub(super) fn c9_both_queries_agree(effort: Effort) -> Outcome {
         .record("rays", f64::from(rays))
 }
 
+/// Points with whole coordinates on the circle of radius 65: a ray goes through such a rim itself.
+const ON_CIRCLE: [[f64; 2]; 8] =
+    [[65.0, 0.0], [0.0, 65.0], [16.0, 63.0], [63.0, -16.0], [-33.0, 56.0], [-25.0, -60.0], [39.0, 52.0], [-52.0, 39.0]];
+
+/// A frustum and a disk at each end that has a radius; `at` places what is mapped and moved up by a height.
+fn capped_frustum([bottom, top]: [f64; 2], height: f64, at: impl Fn(DMat3, f64) -> Transform) -> Vec<Shape> {
+    let flip = DMat3::from_cols(DVec3::X, -DVec3::Y, -DVec3::Z);
+    let side = Analytic::Frustum(Frustum::new(bottom, top, height, TAU).expect(VALID));
+    let mut shapes = vec![Shape::Analytic(TransformedShape::new(side, at(DMat3::IDENTITY, 0.0)))];
+    for (radius, linear, z) in [(bottom, flip, 0.0), (top, DMat3::IDENTITY, height)] {
+        if radius > 0.0 {
+            let cap = Analytic::Disk(Disk::new(radius, 0.0, TAU).expect(VALID));
+            shapes.push(Shape::Analytic(TransformedShape::new(cap, at(linear, z))));
+        }
+    }
+    shapes
+}
+
 pub(super) fn c11_capped_solids(effort: Effort) -> Outcome {
     let mut rng = Rng::new(47);
     let (mut leaks, mut at_rims, mut exact) = (0, 0, 0);
-    let flip = DMat3::from_cols(DVec3::X, -DVec3::Y, -DVec3::Z);
     for (bottom, top, height) in [(65.0, 65.0, 64.0), (65.0, 0.0, 128.0), (16.25, 65.0, 32.0)] {
         for turned in [false, true] {
-            let (turn, offset) = if turned { (rng.rotation(), 100.0 * rng.cube()) } else { (DMat3::IDENTITY, DVec3::ZERO) };
-            let at = |linear: DMat3, z: f64| transform(turn * linear, offset + turn * (z * DVec3::Z));
-            let side = Analytic::Frustum(Frustum::new(bottom, top, height, TAU).expect(VALID));
-            let mut shapes = vec![Shape::Analytic(TransformedShape::new(side, at(DMat3::IDENTITY, 0.0)))];
-            for (radius, linear, z) in [(bottom, flip, 0.0), (top, DMat3::IDENTITY, height)] {
-                if radius > 0.0 {
-                    let cap = Analytic::Disk(Disk::new(radius, 0.0, TAU).expect(VALID));
-                    shapes.push(Shape::Analytic(TransformedShape::new(cap, at(linear, z))));
-                }
-            }
-            let geometry = world(shapes);
+            let (turn, offset) =
+                if turned { (rng.rotation(), 100.0 * rng.cube()) } else { (DMat3::IDENTITY, DVec3::ZERO) };
+            let geometry = world(capped_frustum([bottom, top], height, |linear, z| {
+                transform(turn * linear, offset + turn * (z * DVec3::Z))
+            }));
             let embree = accel::build(AccelKind::EMBREE, &geometry, 1).expect("Embree builds");
             let linear = LinearAccel::new(&geometry);
-            let leaks_in =
-                |ray: &Ray| [&*embree as &dyn Accelerator, &linear].iter().any(|a| a.intersect(ray).is_none() || !a.occluded(ray));
+            let leaks_in = |ray: &Ray| {
+                [&*embree as &dyn Accelerator, &linear].iter().any(|a| a.intersect(ray).is_none() || !a.occluded(ray))
+            };
             let place = |p: DVec3| offset + turn * p;
             for i in 0..effort.pick(50_000, 1_000_000) {
                 let z = height * rng.range(0.05, 0.9);
@@ -384,20 +428,24 @@ pub(super) fn c11_capped_solids(effort: Effort) -> Outcome {
                 let (r, z) = if i % 20 == 0 { (bottom, 0.0) } else { (top, height) };
                 at_rims += usize::from(leaks_in(&ray_through(from, place(dvec3(r * cos, r * sin, z)))));
             }
-            // Points of the rim with whole coordinates: the ray goes through the rim itself.
-            for [x, y] in
-                [[65.0, 0.0], [0.0, 65.0], [16.0, 63.0], [63.0, -16.0], [-33.0, 56.0], [-25.0, -60.0], [39.0, 52.0], [-52.0, 39.0]]
-            {
+            for [x, y] in ON_CIRCLE {
                 for k in 1..effort.pick(20, 500) {
-                    let from = dvec3(0.25 * f64::from(k % 7), 0.125 * f64::from(k % 5), height * f64::from(k % 15 + 1) / 32.0);
+                    let from =
+                        dvec3(0.25 * f64::from(k % 7), 0.125 * f64::from(k % 5), height * f64::from(k % 15 + 1) / 32.0);
                     for (r, z) in [(bottom, 0.0), (top, height)] {
-                        exact += usize::from(leaks_in(&ray_through(place(from), place(dvec3(x * r / 65.0, y * r / 65.0, z)))));
+                        exact += usize::from(leaks_in(&ray_through(
+                            place(from),
+                            place(dvec3(x * r / 65.0, y * r / 65.0, z)),
+                        )));
                     }
                 }
             }
         }
     }
-    Outcome::new().none("leaks", leaks).none("leaks of rays at rims", at_rims).none("leaks of rays exactly through rims", exact)
+    Outcome::new()
+        .none("leaks", leaks)
+        .none("leaks of rays at rims", at_rims)
+        .none("leaks of rays exactly through rims", exact)
 }
 
 pub(super) fn c12_nudged_points(effort: Effort) -> Outcome {

@@ -14,23 +14,31 @@ use crate::math::{DVec3, RayF64, dvec3};
 
 checks! {
     "D1" d1_all_roots_are_found "completeness of roots":
-        "vase, looping profile, ball and a tall curl; rays through points of the surface: general, within 1e-1 to 1e-7 of tangent, tilted by 1e-9 to 1e-2 and by 0, nearly and exactly along the axis, through the axis, on the axis; against all roots of the same polynomial in 106 bits";
+        "vase, looping profile, ball and a tall curl; rays through points of the surface: general, within 1e-1 to 1e-7 \
+         of tangent, tilted by 1e-9 to 1e-2 and by 0, nearly and exactly along the axis, through the axis, on the \
+         axis; against all roots of the same polynomial in 106 bits";
     "D2" d2_roots_are_accurate "accuracy of roots":
         "rays of D1 with as many hits as the reference";
     "D3" d3_equals_quadrics "straight profiles are quadrics":
-        "cylinder, cone and frustum as turned lines, through f32 rays as in C1, against 106 bits; against the frustum's own routine in parts of a turn; two cubics against the sphere they nearly are (error of the cubic: 2.73e-4)";
+        "cylinder, cone and frustum as turned lines, through f32 rays as in C1, against 106 bits; against the \
+         frustum's own routine in parts of a turn; two cubics against the sphere they nearly are (error of the cubic: \
+         2.73e-4)";
     "D4" d4_joints_and_poles "joints and poles are closed":
-        "rays from inside to the joint of a ball of two cubics, also level and within 1e-12 to 1e-16 of it, and through its poles, also within 1e-6 to 1e-16; each must be hit once";
+        "rays from inside to the joint of a ball of two cubics, also level and within 1e-12 to 1e-16 of it, and \
+         through its poles, also within 1e-6 to 1e-16; each must be hit once";
     "D5" d5_spheroids_are_not_hit_again "rays that leave a convex surface":
-        "spheroids of radius 1e-6, 1 and 1e6, centres at 0 to 1e6 radii, directions of every angle with the normal, half of them grazing by 1e-5 to 1e-1";
+        "spheroids of radius 1e-6, 1 and 1e6, centres at 0 to 1e6 radii, directions of every angle with the normal, \
+         half of them grazing by 1e-5 to 1e-1";
     "D6" d6_areas "areas by Pappus":
         "cylinder, cone and ring as lines, a torus as four cubics, a ball as two (within 3e-4 of the sphere)";
     "D7" d7_b_splines "B-splines are Bezier curves":
         "control points at random; points by the basis functions, hits by the converted control points";
     "D8" d8_stored_vectors "stored rays with exact hits":
-        "300 f32 rays at vase, looping profile and ball: general, near tangent, nearly level, level, nearly along the axis; hits of 256 bits in the sources; both for the program and for the reference of D1";
+        "300 f32 rays at vase, looping profile and ball: general, near tangent, nearly level, level, nearly along the \
+         axis; hits of 256 bits in the sources; both for the program and for the reference of D1";
     "D9" d9_nearest_first "hits in order":
-        "rays of D1 on the looping profile: ascending, on the surface, none behind the origin, and found again from their own distance";
+        "rays of D1 on the looping profile: ascending, on the surface, none behind the origin, and found again from \
+         their own distance";
 }
 
 const VALID: &str = "the checks' profiles are valid";
@@ -38,7 +46,8 @@ const VASE: &[[f64; 2]] = &[[0.0, -1.0], [0.9, -1.0], [1.2, -0.3], [0.5, 0.2], [
 const LOOPING: &[[f64; 2]] = &[[0.2, -0.8], [2.5, 1.2], [0.1, 1.4], [1.2, -0.7], [1.6, -1.2], [0.3, 0.4], [0.5, 1.0]];
 /// Half a circle in two segments.
 const ROUND: f64 = 0.552_284_749_8;
-const CIRCLE: &[[f64; 2]] = &[[0.0, -1.0], [ROUND, -1.0], [1.0, -ROUND], [1.0, 0.0], [1.0, ROUND], [ROUND, 1.0], [0.0, 1.0]];
+const CIRCLE: &[[f64; 2]] =
+    &[[0.0, -1.0], [ROUND, -1.0], [1.0, -ROUND], [1.0, 0.0], [1.0, ROUND], [ROUND, 1.0], [0.0, 1.0]];
 /// A cubic with a loop, tall and thin.
 const CURL: &[[f64; 2]] = &[[0.1, -2.0], [0.9, 3.0], [0.0, -1.5], [0.5, 2.0]];
 
@@ -64,8 +73,16 @@ fn hits_of(shape: &Revolution, ray: &RayF64) -> Vec<f64> {
 }
 
 /// Kinds of rays that have troubled solvers.
-const KINDS: [&str; 8] =
-    ["general", "near tangent", "nearly level", "level", "nearly along the axis", "through the axis", "along the axis", "on the axis"];
+const KINDS: [&str; 8] = [
+    "general",
+    "near tangent",
+    "nearly level",
+    "level",
+    "nearly along the axis",
+    "through the axis",
+    "along the axis",
+    "on the axis",
+];
 
 fn test_ray(rng: &mut Rng, shape: &Revolution, kind: usize) -> RayF64 {
     let target = shape.sample([rng.unit(), rng.unit()]);
@@ -118,7 +135,10 @@ fn d1_all_roots_are_found(effort: Effort) -> Outcome {
         .at_least("share of rays with the right number", equal.iter().sum::<usize>() as f64 / rays as f64, 0.999)
         .record("rays that lose hits", lost as f64)
         .record("rays with too many", invented as f64);
-    KINDS.iter().zip(equal).fold(outcome, |outcome, (kind, equal)| outcome.at_least(*kind, equal as f64 / (4 * per_kind) as f64, 0.99))
+    KINDS
+        .iter()
+        .zip(equal)
+        .fold(outcome, |outcome, (kind, equal)| outcome.at_least(*kind, equal as f64 / (4 * per_kind) as f64, 0.99))
 }
 
 /// The equation of D1 at a point of the surface: the squared distance of the surface from the axis less that of the ray
@@ -148,11 +168,16 @@ fn d2_roots_are_accurate(effort: Effort) -> Outcome {
     // What a residual of 1e-13 moves along a ray that passes inside a tangent by 1e-7, with a half chord of sqrt(2e-7).
     let implied = 1e-13 / (2.0 * 2e-7f64.sqrt());
     let worst = distance.iter().copied().fold(0.0, f64::max);
-    let mut outcome =
-        Outcome::new().at_most("residual of the equation / size²", residual, 1e-13).at_most("error of the distance / size", worst, implied);
+    let mut outcome = Outcome::new().at_most("residual of the equation / size²", residual, 1e-13).at_most(
+        "error of the distance / size",
+        worst,
+        implied,
+    );
     if worst > 1e-11 {
-        outcome = outcome
-            .short("a distance near a tangent is known as well as the residual over the slope; the catalogue requires 1e-11 of fewer rays");
+        outcome = outcome.short(
+            "a distance near a tangent is known as well as the residual over the slope; the catalogue requires 1e-11 \
+             of fewer rays",
+        );
     }
     KINDS.iter().zip(distance).fold(outcome, |outcome, (kind, error)| outcome.record(format!("error, {kind}"), error))
 }
@@ -160,7 +185,9 @@ fn d2_roots_are_accurate(effort: Effort) -> Outcome {
 fn d8_stored_vectors(_: Effort) -> Outcome {
     let (mut rays, mut excluded, mut unequal, mut oracle) = (0usize, 0, 0, 0);
     let (mut distance, mut oracle_error) = (0f64, 0f64);
-    let worst = |found: &[f64], exact: &[f64]| found.iter().zip(exact).fold(0f64, |worst, (t, exact)| worst.max((t - exact).abs()));
+    let worst = |found: &[f64], exact: &[f64]| {
+        found.iter().zip(exact).fold(0f64, |worst, (t, exact)| worst.max((t - exact).abs()))
+    };
     for ((_, text), points) in vectors::PROFILES.iter().zip([VASE, LOOPING, CIRCLE]) {
         let shape = turned(points);
         excluded += vectors::excluded(text);
@@ -173,7 +200,8 @@ fn d8_stored_vectors(_: Effort) -> Outcome {
             if found.len() == vector.hits.len() {
                 distance = distance.max(worst(&found, &vector.hits) * ray.direction.length() / ray.origin.length());
             }
-            oracle_error = oracle_error.max(worst(&reference, &vector.hits) * ray.direction.length() / ray.origin.length());
+            oracle_error =
+                oracle_error.max(worst(&reference, &vector.hits) * ray.direction.length() / ray.origin.length());
         }
     }
     Outcome::new()
@@ -201,7 +229,9 @@ fn d9_nearest_first(effort: Effort) -> Outcome {
                 None => lost += 1,
             }
         }
-        behind += usize::from(shape.intersect(&endless(ray.origin + ray.direction.normalize() * 1e3, ray.direction)).is_some());
+        behind += usize::from(
+            shape.intersect(&endless(ray.origin + ray.direction.normalize() * 1e3, ray.direction)).is_some(),
+        );
     }
     Outcome::new()
         .none("hits out of order", disordered)

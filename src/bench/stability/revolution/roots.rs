@@ -34,7 +34,9 @@ fn product(a: &[TwoFloat], b: &[TwoFloat]) -> Polynomial {
 /// `sum of factor * polynomial`.
 fn combined(terms: &[(TwoFloat, &[TwoFloat])]) -> Polynomial {
     let length = terms.iter().map(|(_, p)| p.len()).max().unwrap_or(0);
-    (0..length).map(|i| terms.iter().fold(number(0.0), |sum, (factor, p)| p.get(i).map_or(sum, |&c| sum + *factor * c))).collect()
+    (0..length)
+        .map(|i| terms.iter().fold(number(0.0), |sum, (factor, p)| p.get(i).map_or(sum, |&c| sum + *factor * c)))
+        .collect()
 }
 
 /// A Bezier cubic by powers.

@@ -137,12 +137,16 @@ pub(super) fn d6_areas(_: Effort) -> Outcome {
         (line([0.0, 0.0], [3.0, 4.0]), PI * 3.0 * 5.0),
         (line([0.5, 1.0], [2.0, 1.0]), PI * (4.0 - 0.25)),
     ];
-    let lines = cases.iter().map(|(points, expected)| (turned(points).area() / expected - 1.0).abs()).fold(0.0, f64::max);
+    let lines =
+        cases.iter().map(|(points, expected)| (turned(points).area() / expected - 1.0).abs()).fold(0.0, f64::max);
 
     // The way of the curve's centre of mass times its length, both by small chords whose error falls with the square of
     // their number.
-    let torus: Vec<[f64; 2]> =
-        CIRCLE.iter().map(|p| [p[0] + 2.0, p[1]]).chain(CIRCLE.iter().rev().skip(1).map(|p| [2.0 - p[0], p[1]])).collect();
+    let torus: Vec<[f64; 2]> = CIRCLE
+        .iter()
+        .map(|p| [p[0] + 2.0, p[1]])
+        .chain(CIRCLE.iter().rev().skip(1).map(|p| [2.0 - p[0], p[1]]))
+        .collect();
     let profile = Profile::bezier(&torus).expect(VALID);
     let length = |chords: usize| -> f64 {
         let at = |i: usize| profile.point(4.0 * i as f64 / chords as f64);
@@ -178,8 +182,13 @@ pub(super) fn d7_b_splines(effort: Effort) -> Outcome {
             }
         }
         joints += spline.segments().windows(2).filter(|pair| pair[0][3] != pair[1][0]).count();
-        let bezier: Vec<[f64; 2]> =
-            spline.segments().iter().enumerate().flat_map(|(i, c)| c[usize::from(i > 0)..].to_vec()).map(Into::into).collect();
+        let bezier: Vec<[f64; 2]> = spline
+            .segments()
+            .iter()
+            .enumerate()
+            .flat_map(|(i, c)| c[usize::from(i > 0)..].to_vec())
+            .map(Into::into)
+            .collect();
         let pair = [&spline, &Profile::bezier(&bezier).expect(VALID)].map(|profile| Revolution::new(profile, TAU));
         let [Ok(a), Ok(b)] = pair else { continue };
         for i in 0..20 {

@@ -42,7 +42,8 @@ pub fn compare(view: &View, count: u32, seed: u32) -> Comparison {
 /// The measures of G1, with pictures of the worst histogram.
 pub fn judge_directions(outcome: Outcome, comparisons: &[Comparison]) -> Outcome {
     let level = sidak_level(comparisons.len());
-    let worst = comparisons.iter().min_by(|a, b| a.test.p_value.total_cmp(&b.test.p_value)).expect("views are not empty");
+    let worst =
+        comparisons.iter().min_by(|a, b| a.test.p_value.total_cmp(&b.test.p_value)).expect("views are not empty");
     let outside = comparisons.iter().map(|c| f64::from(c.outside) / f64::from(c.test.count)).fold(0.0, f64::max);
     let outcome = outcome
         .at_least(format!("smallest p-value of {} ({})", comparisons.len(), worst.name), worst.test.p_value, level)
@@ -63,7 +64,10 @@ pub fn judge_integrals(outcome: Outcome, comparisons: &[Comparison]) -> Outcome 
     let largest = comparisons.iter().map(|c| c.test.integral).fold(0.0, f64::max);
     outcome
         .at_most(
-            format!("integral less share of samples that succeed, beyond {deviations:.1} standard errors ({})", worst.name),
+            format!(
+                "integral less share of samples that succeed, beyond {deviations:.1} standard errors ({})",
+                worst.name
+            ),
             excess(worst),
             1e-3,
         )

@@ -6,7 +6,9 @@ use rayon::prelude::*;
 
 use super::super::{Effort, Outcome, Plot};
 use super::materials::{ALPHAS, Material, coats, direction, glass, white, white_metal};
-use crate::bsdf::{Bsdf, Conductor, Dielectric, Eon, Lambert, Mirror, Plastic, Principled, PrincipledParameters, ThinDielectric};
+use crate::bsdf::{
+    Bsdf, Conductor, Dielectric, Eon, Lambert, Mirror, Plastic, Principled, PrincipledParameters, ThinDielectric,
+};
 use crate::color::Rgb;
 use crate::math::Vec3;
 use crate::sampling::{PixelSeed, Sampler, SamplerKind, warp};
@@ -52,7 +54,9 @@ pub(super) fn g5_energy(effort: Effort) -> Outcome {
         .flat_map_iter(|material| {
             cosines(0.001, angles).flat_map(move |cos| {
                 let sides = [direction(cos, 0.05), direction(-cos, 0.2)];
-                sides.map(|wo| (albedo(samples, &material.bsdf, wo, [0.0, 1.01]), format!("{} from {:.3}", material.name, wo.z)))
+                sides.map(|wo| {
+                    (albedo(samples, &material.bsdf, wo, [0.0, 1.01]), format!("{} from {:.3}", material.name, wo.z))
+                })
             })
         })
         .collect();
@@ -84,9 +88,17 @@ impl White {
     }
 
     fn principled_metal(roughness: f32) -> Self {
-        let all = PrincipledParameters { base_color: Rgb::WHITE, metallic: 1.0, roughness, ..PrincipledParameters::default() };
+        let all = PrincipledParameters {
+            base_color: Rgb::WHITE,
+            metallic: 1.0,
+            roughness,
+            ..PrincipledParameters::default()
+        };
         let once = PrincipledParameters { multiscatter: false, ..all };
-        Self { once: Some(Bsdf::Principled(Principled::new(&once))), ..Self::plain(Bsdf::Principled(Principled::new(&all))) }
+        Self {
+            once: Some(Bsdf::Principled(Principled::new(&once))),
+            ..Self::plain(Bsdf::Principled(Principled::new(&all)))
+        }
     }
 
     fn glass(ior: f32, alpha: f32) -> Self {
@@ -148,14 +160,18 @@ impl Family {
                 let inside = white.material.bsdf.flags().transmits().then_some(-cos);
                 [*cos].into_iter().chain(inside).map(move |cos| white.albedo(samples, direction(cos, turns)))
             });
-            let (least, most) = albedos.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), a| (low.min(a), high.max(a)));
+            let (least, most) =
+                albedos.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), a| (low.min(a), high.max(a)));
             (f64::from(*cos), least, most)
         };
         let rows: Vec<_> = cosines.par_iter().map(extremes).collect();
         Furnace {
             least: rows.iter().map(|row| row.1).fold(f64::INFINITY, f64::min),
             most: rows.iter().map(|row| row.2).fold(f64::NEG_INFINITY, f64::max),
-            errors: rows.into_iter().map(|(cos, least, most)| (cos, (1.0 - least).abs().max((most - 1.0).abs()))).collect(),
+            errors: rows
+                .into_iter()
+                .map(|(cos, least, most)| (cos, (1.0 - least).abs().max((most - 1.0).abs())))
+                .collect(),
         }
     }
 }
@@ -185,24 +201,34 @@ fn coated() -> [Vec<White>; 2] {
     let is_exact = |material: &Material| material.name.ends_with("lambert") || material.name.ends_with("mirror");
     let coats = coats(Rgb::WHITE, Rgb::WHITE).into_iter().filter(is_exact).map(|material| material.bsdf);
     let plastics = [[0.01; 2], [0.1; 2], [0.5; 2], [1.0; 2], ALPHAS[2], [0.1, 0.4]].map(plastic);
-    let (turned, round): (Vec<_>, Vec<_>) = coats.chain(plastics).partition(|bsdf: &Bsdf| bsdf.flags().is_anisotropic());
+    let (turned, round): (Vec<_>, Vec<_>) =
+        coats.chain(plastics).partition(|bsdf: &Bsdf| bsdf.flags().is_anisotropic());
     [round, turned].map(|list| list.into_iter().map(White::plain).collect())
 }
 
-const METAL: &str = "anisotropic metal may lose 0.02 in place of 0.01: what it scatters at once is read between the tables' two axes and eleven aspects, \
-     and what is added for several reflections is made a hundredth too dark on purpose, so that nothing shines";
+const METAL: &str = "anisotropic metal may lose 0.02 in place of 0.01: what it scatters at once is read between the \
+                     tables' two axes and eleven aspects, and what is added for several reflections is made a \
+                     hundredth too dark on purpose, so that nothing shines";
 
 fn families() -> Vec<Family> {
     let mut metals: Vec<_> = [1e-3, 0.01, 0.05, 0.1, 0.3, 0.6, 1.0].map(|alpha| White::metal([alpha; 2])).into();
     metals.extend([0.0, 0.3, 0.7, 1.0].map(White::principled_metal));
     let aspects = [0.02, 0.09, 0.22, 0.4, 0.6, 0.85];
-    let stretched = [0.02, 0.1, 0.3, 0.75, 1.0].into_iter().flat_map(|alpha| aspects.map(|aspect| White::metal([alpha * aspect, alpha])));
-    let glasses = [1.1, 1.5, 2.4, 0.7].into_iter().flat_map(|ior| [0.01, 0.1, 0.4, 1.0].map(|alpha| White::glass(ior, alpha)));
+    let stretched = [0.02, 0.1, 0.3, 0.75, 1.0]
+        .into_iter()
+        .flat_map(|alpha| aspects.map(|aspect| White::metal([alpha * aspect, alpha])));
+    let glasses =
+        [1.1, 1.5, 2.4, 0.7].into_iter().flat_map(|ior| [0.01, 0.1, 0.4, 1.0].map(|alpha| White::glass(ior, alpha)));
     let [round, turned] = coated();
     vec![
         Family::new("without microfacets", smooth()),
         Family::new("rough metal", metals),
-        Family { azimuths: AZIMUTHS, least: 0.98, cause: Some(METAL), ..Family::new("anisotropic metal", stretched.collect()) },
+        Family {
+            azimuths: AZIMUTHS,
+            least: 0.98,
+            cause: Some(METAL),
+            ..Family::new("anisotropic metal", stretched.collect())
+        },
         Family::new("rough glass", glasses.collect()),
         Family::new("coats", round),
         Family { azimuths: AZIMUTHS, ..Family::new("anisotropic coats", turned) },
@@ -268,12 +294,17 @@ pub(super) fn g7_single_scattering(effort: Effort) -> Outcome {
             entries = entries.max((scattered_once(alpha, cos, steps) - expected).abs());
         }
         let cosines = (0..64u8).map(|i| (f32::from(i) + 0.5) / 64.0);
-        let average: f64 = cosines.map(|cos| 2.0 * f64::from(cos) * scattered_once(alpha, cos, steps / 4)).sum::<f64>() / 64.0;
+        let average: f64 =
+            cosines.map(|cos| 2.0 * f64::from(cos) * scattered_once(alpha, cos, steps / 4)).sum::<f64>() / 64.0;
         means = means.max((average - mean).abs());
     }
     // A unit of the last digit, and what the rule leaves where samples end below the horizon.
     Outcome::new()
         .at_most("error at 4 alphas and 6 cosines", entries, 5e-5)
         .at_most("error of the means under diffuse light", means, 2e-4)
-        .at_most("error of 1 - ln 2 at alpha 1 from ahead", (scattered_once(1.0, 1.0, steps) - (1.0 - LN_2)).abs(), 1e-5)
+        .at_most(
+            "error of 1 - ln 2 at alpha 1 from ahead",
+            (scattered_once(1.0, 1.0, steps) - (1.0 - LN_2)).abs(),
+            1e-5,
+        )
 }

@@ -69,10 +69,11 @@ pub(super) fn g9_fresnel(effort: Effort) -> Outcome {
     let ahead = [1.5, 1.0 / 1.5].map(|eta| f64::from((dielectric(1.0, eta).reflectance - 0.04).abs()));
     let glasses = [1.1, 1.5, 10.0, 0.5].map(|eta| dielectric(0.0, eta).reflectance);
     let metals = [[0.2, 3.9], [0.0, 1.0]].map(|[eta, k]| ComplexIndex::new(eta, k).reflectance(0.0));
-    let grazing: Vec<f64> = glasses.into_iter().chain(metals).map(|reflectance| f64::from((1.0 - reflectance).abs())).collect();
+    let grazing: Vec<f64> =
+        glasses.into_iter().chain(metals).map(|reflectance| f64::from((1.0 - reflectance).abs())).collect();
     out_of_range += usize::from(!(0.0..=1.0).contains(&ComplexIndex::new(0.0, 0.0).reflectance(1.0)));
-    let averages =
-        [(1.5, 0.091_78), (1.0 / 1.5, 0.596_35), (1.0, 0.0)].map(|(eta, average)| f64::from((dielectric_average(eta) - average).abs()));
+    let averages = [(1.5, 0.091_78), (1.0 / 1.5, 0.596_35), (1.0, 0.0)]
+        .map(|(eta, average)| f64::from((dielectric_average(eta) - average).abs()));
     let largest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
     Outcome::new()
         .at_most("0.04 ahead for 1.5 from both sides, error", largest(&ahead), 1e-7)

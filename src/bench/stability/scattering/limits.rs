@@ -58,10 +58,15 @@ fn judge_smooth_limit(outcome: Outcome, effort: Effort) -> Outcome {
     ];
     let deltas = pairs.iter().filter(|(rough, _)| rough.flags().is_delta()).count();
     let cases = pairs.iter().flat_map(|pair| [1.0, 0.8, 0.4, -0.9, -0.5].map(|cos| (pair, direction(cos, 0.3))));
-    let found: Vec<_> = cases.map(|((rough, smooth), wo)| welch(rough, smooth, wo, effort.pick(20_000, 1_000_000))).collect();
+    let found: Vec<_> =
+        cases.map(|((rough, smooth), wo)| welch(rough, smooth, wo, effort.pick(20_000, 1_000_000))).collect();
     outcome
         .none("materials that count as smooth already", deltas)
-        .at_least("smallest p-value of rough against smooth", found.iter().map(|f| f.0).fold(1.0, f64::min), sidak_level(found.len()))
+        .at_least(
+            "smallest p-value of rough against smooth",
+            found.iter().map(|f| f.0).fold(1.0, f64::min),
+            sidak_level(found.len()),
+        )
         // A lobe of width 4e-4 changes the mean by about as much.
         .at_most("relative difference by the same random numbers", found.iter().map(|f| f.1).fold(0.0, f64::max), 2e-3)
 }

@@ -1,8 +1,8 @@
 //! BSDFs of every kind, and directions to look at them from.
 
 use crate::bsdf::{
-    Bsdf, Coat, Coated, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Phong, Plastic, Principled,
-    PrincipledParameters, ThinDielectric,
+    Bsdf, Coat, Coated, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Phong, Plastic,
+    Principled, PrincipledParameters, ThinDielectric,
 };
 use crate::color::Rgb;
 use crate::math::{Vec3, sin_cos_turns, vec3};
@@ -61,7 +61,8 @@ fn principled(parameters: &PrincipledParameters) -> Bsdf {
 
 /// Opaque bases of every kind for a coat; the last is smooth.
 fn bases(color: Rgb) -> Vec<Material> {
-    let coat = PrincipledParameters { base_color: color, clearcoat: 1.0, sheen: 0.5, ..PrincipledParameters::default() };
+    let coat =
+        PrincipledParameters { base_color: color, clearcoat: 1.0, sheen: 0.5, ..PrincipledParameters::default() };
     let half = color * 0.5;
     vec![
         Material::new("lambert", Bsdf::Lambert(Lambert { albedo: color })),
@@ -114,7 +115,8 @@ fn blends() -> Vec<Material> {
 /// Coloured materials of every kind that has a density.
 pub fn rough() -> Vec<Material> {
     let eon = |roughness| Bsdf::Eon(Eon { albedo: COLOR, roughness });
-    let torrance = |alpha| Bsdf::Glossy(Glossy::new(Rgb::new(0.4, 0.2, 0.1), Rgb::new(0.3, 0.18, 0.06), Rgb::splat(0.6), alpha));
+    let torrance =
+        |alpha| Bsdf::Glossy(Glossy::new(Rgb::new(0.4, 0.2, 0.1), Rgb::new(0.3, 0.18, 0.06), Rgb::splat(0.6), alpha));
     let phong = |exponent| Bsdf::Glossy(Glossy::phong(Rgb::new(0.6, 0.3, 0.2), Rgb::splat(0.4), exponent));
     let cosine = |exponent| Bsdf::Phong(Phong::new(Rgb::new(0.6, 0.3, 0.2), Rgb::splat(0.4), exponent));
     let leaf = DiffuseTransmission::new(Rgb::new(0.3, 0.5, 0.1), Rgb::new(0.6, 0.5, 0.2));
@@ -133,7 +135,10 @@ pub fn rough() -> Vec<Material> {
         Material::new("cosine lobe 40", cosine(40.0)),
         Material::new("plastic, smooth", plastic([0.0; 2])),
         Material::new("metal, once", Bsdf::Conductor(white_metal([0.5; 2]).single_scattering())),
-        Material { ior: 1.5, ..Material::new("glass, once", Bsdf::Dielectric(Dielectric::new(1.5, [0.5; 2]).single_scattering())) },
+        Material {
+            ior: 1.5,
+            ..Material::new("glass, once", Bsdf::Dielectric(Dielectric::new(1.5, [0.5; 2]).single_scattering()))
+        },
     ];
     for alpha in ALPHAS {
         list.push(Material::new(format!("gold {alpha:?}"), gold(alpha)));
@@ -167,7 +172,9 @@ pub fn white() -> Vec<Material> {
         Material::new("pane", Bsdf::ThinDielectric(ThinDielectric::new(1.5))),
     ];
     list.extend(
-        [0.01, 0.3, 0.7, 1.0].map(|roughness| Material::new(format!("eon {roughness}"), Bsdf::Eon(Eon { albedo: Rgb::WHITE, roughness }))),
+        [0.01, 0.3, 0.7, 1.0].map(|roughness| {
+            Material::new(format!("eon {roughness}"), Bsdf::Eon(Eon { albedo: Rgb::WHITE, roughness }))
+        }),
     );
     list.extend([0.05, 0.3, 1.0].map(|alpha| Material::new(format!("glossy {alpha}"), glossy(alpha))));
     for alpha in ALPHAS.into_iter().chain([[0.0; 2], [1e-3; 2], [0.02, 0.08], [1.0, 0.3]]) {
@@ -178,7 +185,8 @@ pub fn white() -> Vec<Material> {
     }
     list.extend(coats(Rgb::WHITE, Rgb::WHITE));
     for (roughness, anisotropic) in [(0.4, 0.9), (0.7, 0.5), (0.7, 1.0), (1.0, 0.7), (1.0, 1.0)] {
-        let parameters = PrincipledParameters { base_color: Rgb::WHITE, roughness, anisotropic, ..PrincipledParameters::default() };
+        let parameters =
+            PrincipledParameters { base_color: Rgb::WHITE, roughness, anisotropic, ..PrincipledParameters::default() };
         list.push(Material::new(format!("principled {roughness} stretched {anisotropic}"), principled(&parameters)));
     }
     list.extend((0..2048).step_by(97).map(corner));
@@ -216,7 +224,9 @@ pub fn views(materials: Vec<Material>) -> Vec<View> {
     for material in materials {
         let inside = OUTSIDE.map(|cos| -cos);
         let beyond = if material.bsdf.flags().transmits() { &inside[..] } else { &BEHIND[..] };
-        list.extend(OUTSIDE.iter().chain(beyond).map(|&cos| View { material: material.clone(), wo: direction(cos, 0.1) }));
+        list.extend(
+            OUTSIDE.iter().chain(beyond).map(|&cos| View { material: material.clone(), wo: direction(cos, 0.1) }),
+        );
     }
     list
 }

@@ -51,7 +51,11 @@ fn two_sample_p_value(a: &[u32], b: &[u32]) -> f64 {
             pool = [0.0; 2];
         }
     }
-    if cells < 2 { 1.0 } else { ChiSquared::new(f64::from(cells - 1)).expect("positive degrees of freedom").sf(statistic) }
+    if cells < 2 {
+        1.0
+    } else {
+        ChiSquared::new(f64::from(cells - 1)).expect("positive degrees of freedom").sf(statistic)
+    }
 }
 
 /// What is found for one distribution and direction.
@@ -95,10 +99,13 @@ fn compare(alpha: [f32; 2], cos: f32, count: u32) -> Normals {
 pub(super) fn g8_visible_normals(effort: Effort) -> Outcome {
     let alphas = ALPHAS.into_iter().chain([[1e-4; 2], [1e-3; 2], [1.0, 1e-4], [0.1, 0.9]]);
     let cases: Vec<_> = alphas.flat_map(|alpha| [1.0, 0.5, 0.05, 1e-3, 1e-6].map(|cos| (alpha, cos))).collect();
-    let found: Vec<_> = cases.par_iter().map(|&(alpha, cos)| compare(alpha, cos, effort.pick(40_000, 2_000_000))).collect();
+    let found: Vec<_> =
+        cases.par_iter().map(|&(alpha, cos)| compare(alpha, cos, effort.pick(40_000, 2_000_000))).collect();
     let level = sidak_level(found.len());
     let worst = found.iter().min_by(|a, b| a.p_value.total_cmp(&b.p_value)).expect("there are cases");
-    let hidden = found.iter().map(|n| n.hidden).sum::<usize>() as f64 / found.len() as f64 / f64::from(effort.pick(40_000, 2_000_000));
+    let hidden = found.iter().map(|n| n.hidden).sum::<usize>() as f64
+        / found.len() as f64
+        / f64::from(effort.pick(40_000, 2_000_000));
 
     let densities: Vec<f64> = ALPHAS
         .iter()
@@ -110,13 +117,18 @@ pub(super) fn g8_visible_normals(effort: Effort) -> Outcome {
         .collect();
     let outcome = Outcome::new()
         .at_least(format!("smallest p-value of {}, two samplers ({})", found.len(), worst.name), worst.p_value, level)
-        .at_least("smallest p-value against the density", densities.iter().copied().fold(1.0, f64::min), sidak_level(densities.len()))
+        .at_least(
+            "smallest p-value against the density",
+            densities.iter().copied().fold(1.0, f64::min),
+            sidak_level(densities.len()),
+        )
         .none("normals that are no unit vectors of the upper side", found.iter().map(|n| n.broken).sum())
         .at_least("least cosine with the direction", found.iter().map(|n| n.least_cos).fold(1.0, f64::min), 0.0)
         .record("fraction of normals seen from behind", hidden);
     if worst.p_value >= level {
         return outcome;
     }
-    let [ours, other] = worst.histograms.each_ref().map(|cells| cells.iter().copied().map(f64::from).collect::<Vec<_>>());
+    let [ours, other] =
+        worst.histograms.each_ref().map(|cells| cells.iter().copied().map(f64::from).collect::<Vec<_>>());
     outcome.pictures("normals", COLUMNS, &ours, &other)
 }

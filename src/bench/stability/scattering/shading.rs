@@ -14,7 +14,8 @@ fn tilted(degrees: f64, by_map: bool, material: Value) -> Value {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let code = [0.5 + 0.5 * sin, 0.5, 0.5 + 0.5 * cos];
     let corners = json!([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]);
-    let mut shape = json!({ "type": "mesh", "material": "m", "positions": corners, "triangles": [[0, 1, 2], [0, 2, 3]] });
+    let mut shape =
+        json!({ "type": "mesh", "material": "m", "positions": corners, "triangles": [[0, 1, 2], [0, 2, 3]] });
     shape["uvs"] = json!([[0, 0], [1, 0], [1, 1], [0, 1]]);
     let mut relief = json!({ "type": "relief", "material": "plain", "normal_map": { "texture": "map" } });
     if !by_map {
@@ -54,7 +55,8 @@ fn furnace(effort: Effort) -> f64 {
     for degrees in effort.pick(&[80.0][..], &[20.0, 50.0, 80.0, 85.0]) {
         for (by_map, material, from) in cases() {
             let shape = tilted(*degrees, by_map, material);
-            let Estimate { mean, error } = Estimate::of(&render(&scene(from, effort.pick(64, 256), shape, sky.clone())), 1);
+            let Estimate { mean, error } =
+                Estimate::of(&render(&scene(from, effort.pick(64, 256), shape, sky.clone())), 1);
             largest = largest.max(mean - 5.0 * error);
         }
     }
@@ -143,5 +145,9 @@ pub(super) fn g11_shading_normals(effort: Effort) -> Outcome {
         .at_most("slope of the terminator factor", slope, 1.34)
         // The cosine to the leaning normal changes by at most 1.1 pi / 2 over all heights, and the factor by 4/3 in g,
         // which the sine of the height moves at 1 / (cos 40 cos 50) next to the terminator.
-        .at_most("change of the radiance with the height of the light", steepest(effort), 1.1 * std::f64::consts::FRAC_PI_2 * 2.8)
+        .at_most(
+            "change of the radiance with the height of the light",
+            steepest(effort),
+            1.1 * std::f64::consts::FRAC_PI_2 * 2.8,
+        )
 }

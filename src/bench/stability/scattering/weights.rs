@@ -120,7 +120,11 @@ pub(super) fn g4_reciprocity(effort: Effort) -> Outcome {
         for i in 0..effort.pick(4_000, 100_000) {
             let a = any_direction(&mut rng);
             // Half of the pairs lie within the lobes.
-            let sample = if i % 2 == 0 { material.bsdf.sample(a, rng.unit_f32(), rng.pair()).filter(|s| !s.is_delta) } else { None };
+            let sample = if i % 2 == 0 {
+                material.bsdf.sample(a, rng.unit_f32(), rng.pair()).filter(|s| !s.is_delta)
+            } else {
+                None
+            };
             let b = sample.map_or_else(|| any_direction(&mut rng), |s| s.wi);
             let (ab, ba) = (scaled(&material, a, b), scaled(&material, b, a));
             if b.z.abs() < 0.001 || ab.iter().chain(&ba).all(|&x| x < 1e-18) {
@@ -145,7 +149,11 @@ pub(super) fn g4_reciprocity(effort: Effort) -> Outcome {
         }
     }
     Outcome::new()
-        .at_most(format!("relative difference beyond what rounding the directions by 2^-22 changes ({worst})"), unexplained, 1e-4)
+        .at_most(
+            format!("relative difference beyond what rounding the directions by 2^-22 changes ({worst})"),
+            unexplained,
+            1e-4,
+        )
         .record("relative difference in all", raw)
         .at_least("pairs on the same side", compared[0] as f64, 1e4)
         .at_least("pairs on opposite sides", compared[1] as f64, 1e4)

@@ -46,7 +46,11 @@ pub(super) fn b7_instances(effort: Effort) -> Outcome {
         for _ in 0..effort.pick(60, 600) {
             let scale = rng.magnitude(-2.0, 2.0);
             let mirror = if rng.unit() < 0.5 { -1.0 } else { 1.0 };
-            let stretch = DMat3::from_diagonal(DVec3::new(mirror, rng.range(1.0, anisotropy), 1.0 / rng.range(1.0, anisotropy).sqrt()));
+            let stretch = DMat3::from_diagonal(DVec3::new(
+                mirror,
+                rng.range(1.0, anisotropy),
+                1.0 / rng.range(1.0, anisotropy).sqrt(),
+            ));
             let linear = rng.rotation() * stretch * rng.rotation() * scale;
             let translation = rng.cube() * scale * rng.magnitude(-1.0, 5.0);
             let placement = transform(linear, translation);
@@ -78,7 +82,8 @@ struct Chain {
 
 /// A regular map with scale and shear.
 fn sheared(rng: &mut Rng) -> DAffine3 {
-    let stretch = DMat3::from_diagonal(DVec3::new(rng.magnitude(-0.5, 0.5), rng.magnitude(-0.5, 0.5), rng.magnitude(-0.5, 0.5)));
+    let stretch =
+        DMat3::from_diagonal(DVec3::new(rng.magnitude(-0.5, 0.5), rng.magnitude(-0.5, 0.5), rng.magnitude(-0.5, 0.5)));
     DAffine3 { matrix3: rng.rotation() * stretch * rng.rotation(), translation: 3.0 * rng.cube() }
 }
 
@@ -100,7 +105,10 @@ fn in_instance(shape: Shape, motion: Motion, time: f64) -> Chain {
     let at_time = motion.map_at(time);
     let instance = Instance::moving(ObjectId(0), motion).expect("the motion is regular");
     let objects = vec![Object { shapes: vec![ShapeId(0)] }];
-    Chain { geometry: Geometry { shapes: vec![shape], objects, instances: vec![instance], ..Geometry::default() }, at_time }
+    Chain {
+        geometry: Geometry { shapes: vec![shape], objects, instances: vec![instance], ..Geometry::default() },
+        at_time,
+    }
 }
 
 /// Twelve ways to place a cube, and half of them a sphere too.
@@ -116,8 +124,10 @@ fn chains(rng: &mut Rng, time: f64) -> Vec<Chain> {
     all.push(Chain { geometry: world(vec![unit_cube()]), at_time: DAffine3::IDENTITY });
     all.push(Chain { geometry: world(vec![Shape::Mesh(cube(map.matrix3, map.translation))]), at_time: map });
     all.push(Chain { geometry: world(vec![sphere(map)]), at_time: map });
-    let (from, to) = (sheared(rng), DAffine3 { matrix3: DMat3::from_diagonal(DVec3::new(0.2, 0.1, 0.3)), translation: rng.cube() });
-    let to = DAffine3 { matrix3: from.matrix3 + from.matrix3 * to.matrix3, translation: from.translation + to.translation };
+    let (from, to) =
+        (sheared(rng), DAffine3 { matrix3: DMat3::from_diagonal(DVec3::new(0.2, 0.1, 0.3)), translation: rng.cube() });
+    let to =
+        DAffine3 { matrix3: from.matrix3 + from.matrix3 * to.matrix3, translation: from.translation + to.translation };
     let between = DAffine3 {
         matrix3: from.matrix3 * (1.0 - time) + to.matrix3 * time,
         translation: from.translation * (1.0 - time) + to.translation * time,
@@ -182,5 +192,9 @@ pub(super) fn b3_two_sides(effort: Effort) -> Outcome {
 
 /// The chains that move or deform, for rays that leave outwards.
 pub(super) fn moving_chains(rng: &mut Rng, time: f64) -> Vec<(Geometry, DAffine3)> {
-    chains(rng, time).into_iter().filter(|chain| chain.geometry.is_moving()).map(|chain| (chain.geometry, chain.at_time)).collect()
+    chains(rng, time)
+        .into_iter()
+        .filter(|chain| chain.geometry.is_moving())
+        .map(|chain| (chain.geometry, chain.at_time))
+        .collect()
 }

@@ -27,33 +27,52 @@ use triangles::{b1_triangles, b5_slivers, b6_neighbours, b8_large_ground};
 
 checks! {
     "B1" b1_triangles "a triangle is not found again":
-        "random triangles, all corners of one size or each coordinate of its own, 1e-8 to 1e8; rays and segments that leave to either side, half of them grazing down to 1e-5, closest and any hit (pbrt, Triangle.Reintersect)";
+        "random triangles, all corners of one size or each coordinate of its own, 1e-8 to 1e8; rays and segments that \
+         leave to either side, half of them grazing down to 1e-5, closest and any hit (pbrt, Triangle.Reintersect)";
     "B2" b2_convex_shapes "a convex shape is not found again":
-        "spheres, cylinders, cones, frusta and surfaces of revolution, whole and in part, disks, quads; radius 1e-4 to 1e4, turned, scaled by 1e-4 to 1e4, moved by 1e-8 to 1e8; rays and segments that leave outwards, half of them grazing, closest and any hit (pbrt, TestReintersectConvex)";
+        "spheres, cylinders, cones, frusta and surfaces of revolution, whole and in part, disks, quads; radius 1e-4 to \
+         1e4, turned, scaled by 1e-4 to 1e4, moved by 1e-8 to 1e8; rays and segments that leave outwards, half of them \
+         grazing, closest and any hit (pbrt, TestReintersectConvex)";
     "B3" b3_two_sides "both sides of a hit point":
-        "the origins on both sides of a point, a ray along the normal from each: one misses, one hits; cube and sphere through 12 chains of transforms, at rest and moving, with scale and shear, at time 0.66 (OptiX Toolkit, testSia)";
+        "the origins on both sides of a point, a ray along the normal from each: one misses, one hits; cube and sphere \
+         through 12 chains of transforms, at rest and moving, with scale and shear, at time 0.66 (OptiX Toolkit, \
+         testSia)";
     "B4" b4_closed_boxes "closed boxes do not leak":
-        "rotated cubes, half size 1e-6, 1 and 1e6, 0 and 1e4 half sizes from the origin; rays from inside, reflected at random";
+        "rotated cubes, half size 1e-6, 1 and 1e6, 0 and 1e4 half sizes from the origin; rays from inside, reflected \
+         at random";
     "B5" b5_slivers "slivers are not found again":
-        "single triangles of aspect 1 to 1e-4, flat ones (an obtuse angle near 180 degrees) and needles; rays and segments, half of them grazing, closest and any hit. Retraces: hits that only the second look in f64 refuses";
+        "single triangles of aspect 1 to 1e-4, flat ones (an obtuse angle near 180 degrees) and needles; rays and \
+         segments, half of them grazing, closest and any hit. Retraces: hits that only the second look in f64 refuses";
     "B6" b6_neighbours "coplanar neighbours are not found":
-        "tilted planar mesh of 6 x 6 cells, aspect 1 to 1e-2, right-angled and flat triangles, 0 to 100 sizes from the origin; rays that leave, half of them grazing, closest and any hit, against exact hits of the rounded mesh";
+        "tilted planar mesh of 6 x 6 cells, aspect 1 to 1e-2, right-angled and flat triangles, 0 to 100 sizes from the \
+         origin; rays that leave, half of them grazing, closest and any hit, against exact hits of the rounded mesh";
     "B7" b7_instances "convex instances are not found again":
-        "cube in an instance, scaled by 1e-2 to 1e2, also unevenly by up to 100 and mirrored, moved by up to 1e5 scales, closest and any hit";
+        "cube in an instance, scaled by 1e-2 to 1e2, also unevenly by up to 100 and mirrored, moved by up to 1e5 \
+         scales, closest and any hit";
     "B8" b8_large_ground "a large ground is not found again near the world's origin":
-        "triangle of size 1e4 to 1e6 through the origin, hit within 0.01 of it: the point is tiny and the error is not (Computer Graphics Stack Exchange 8691)";
+        "triangle of size 1e4 to 1e6 through the origin, hit within 0.01 of it: the point is tiny and the error is not \
+         (Computer Graphics Stack Exchange 8691)";
     "B9" b9_quads "rays go on through a quad":
-        "quads at height -400 to 400, as analytic shape and as two triangles: a ray that hits goes on in its direction (pbrt, BilinearPatch.Offset)";
+        "quads at height -400 to 400, as analytic shape and as two triangles: a ray that hits goes on in its direction \
+         (pbrt, BilinearPatch.Offset)";
     "B10" b10_spheres "pictures of tiny and huge spheres":
-        "white sphere of radius 1e-3 or 3e5 at 3, 8000 and 2e5 radii from the camera, which is far away or moves the sphere there; under a constant sky it is white, under a sun the picture is the same for all radii (OSPRay, SpherePrecision)";
+        "white sphere of radius 1e-3 or 3e5 at 3, 8000 and 2e5 radii from the camera, which is far away or moves the \
+         sphere there; under a constant sky it is white, under a sun the picture is the same for all radii (OSPRay, \
+         SpherePrecision)";
     "B11" b11_continue "a ray meets each of many surfaces once":
-        "64 parallel quads, analytic or of triangles, 1 apart or 4 floats apart; after each hit the ray goes on from the next float (Embree, next_hit)";
+        "64 parallel quads, analytic or of triangles, 1 apart or 4 floats apart; after each hit the ray goes on from \
+         the next float (Embree, next_hit)";
     "B12" b12_emitters "shadow rays reach the emitter":
-        "from a floor to sampled points of an emitter of each shape, 1e-3 to 1e6 away: nothing is in the way (pbrt, SpawnRayTo)";
+        "from a floor to sampled points of an emitter of each shape, 1e-3 to 1e6 away: nothing is in the way (pbrt, \
+         SpawnRayTo)";
     "B13" b13_schemes "offset schemes side by side":
-        "rotated cube of half size 1e-6 to 1e6, and one of half size 1000 at 0 to 1e7 from the world's centre; rays from inside, reflected at random: the own face again is a false hit, no hit is a leak. Others: none, from 1e-4 along the ray, Waechter and Binder (Ray Tracing Gems, ch. 6), along the normal by 8.94e-5 (1 + largest coordinate) as Mitsuba";
+        "rotated cube of half size 1e-6 to 1e6, and one of half size 1000 at 0 to 1e7 from the world's centre; rays \
+         from inside, reflected at random: the own face again is a false hit, no hit is a leak. Others: none, from \
+         1e-4 along the ray, Waechter and Binder (Ray Tracing Gems, ch. 6), along the normal by 8.94e-5 (1 + largest \
+         coordinate) as Mitsuba";
     "B14" b14_moving "moving surfaces are not found again":
-        "cube and sphere in instances that move, a deforming cube at rest and in one that moves, at random times and at 0.66; rays that leave outwards, closest and any hit";
+        "cube and sphere in instances that move, a deforming cube at rest and in one that moves, at random times and \
+         at 0.66; rays that leave outwards, closest and any hit";
     "B15" b15_sliver_emitters "shadow rays reach emitters of slivers":
         "from a floor to sampled points of flat triangles of aspect 1e-2 and 1e-4, 1e-3 to 1e3 away";
 }
@@ -66,8 +85,9 @@ type Named<'g> = (&'static str, Box<dyn Accelerator + 'g>);
 /// The accelerators that leave a surface each in its way: Embree and packets with `f32`, and the others (one primitive
 /// test) by the bounding volume hierarchy.
 fn accelerators(geometry: &Geometry) -> Vec<Named<'_>> {
-    let single =
-        |name: &'static str| (name, accel::build(name.parse().expect("names of accelerators"), geometry, 1).expect("accelerators build"));
+    let single = |name: &'static str| {
+        (name, accel::build(name.parse().expect("names of accelerators"), geometry, 1).expect("accelerators build"))
+    };
     vec![single("embree"), single("bvh"), ("packets", packets(geometry))]
 }
 
@@ -127,7 +147,14 @@ struct Leavings {
 
 impl Leavings {
     /// Leaves in `direction`, without an end and to a point `distance` away.
-    fn leave(&mut self, accel: &dyn Accelerator, geometry: &Geometry, si: &SurfaceInteraction, direction: DVec3, distance: f64) {
+    fn leave(
+        &mut self,
+        accel: &dyn Accelerator,
+        geometry: &Geometry,
+        si: &SurfaceInteraction,
+        direction: DVec3,
+        distance: f64,
+    ) {
         let ray = si.spawn(direction.as_vec3());
         let Closest { found, retraces } = closest(accel, geometry, &ray);
         self.rays += 1;

@@ -50,7 +50,13 @@ fn moved_by_floats(p: Vec3, n: Vec3) -> Vec3 {
 
 impl Scheme {
     /// The next hit in `direction`, inside of the box.
-    fn next(self, accel: &dyn Accelerator, geometry: &Geometry, at: &SurfaceInteraction, direction: Vec3) -> Option<u32> {
+    fn next(
+        self,
+        accel: &dyn Accelerator,
+        geometry: &Geometry,
+        at: &SurfaceInteraction,
+        direction: Vec3,
+    ) -> Option<u32> {
         if self == Self::ErrorBound {
             return closest(accel, geometry, &at.spawn(direction)).found.map(|found| found.prim.0);
         }
@@ -109,15 +115,18 @@ fn sweep(x: &str, points: &[(f64, [[f64; 2]; SCHEMES.len()])]) -> [Plot; 2] {
 pub(super) fn b13_schemes(effort: Effort) -> Outcome {
     let mut rng = Rng::new(13);
     let count = effort.pick(4_000, 200_000);
-    let by_scale: Vec<_> = (-6..=6).map(|k| 10f64.powi(k)).map(|half| (half, rates(&mut rng, half, 0.0, count))).collect();
-    let by_distance: Vec<_> = (0..=7).map(|k| 10f64.powi(k)).map(|distance| (distance, rates(&mut rng, 1000.0, distance, count))).collect();
+    let by_scale: Vec<_> =
+        (-6..=6).map(|k| 10f64.powi(k)).map(|half| (half, rates(&mut rng, half, 0.0, count))).collect();
+    let by_distance: Vec<_> =
+        (0..=7).map(|k| 10f64.powi(k)).map(|distance| (distance, rates(&mut rng, 1000.0, distance, count))).collect();
 
     let worst = |points: &[(f64, [[f64; 2]; SCHEMES.len()])], scheme: usize, kind: usize| {
         points.iter().map(|(_, rates)| rates[scheme][kind]).fold(0f64, f64::max)
     };
     let mut outcome = Outcome::new();
     for (i, (scheme, name)) in SCHEMES.iter().enumerate() {
-        let (again, leaks) = (worst(&by_scale, i, 0).max(worst(&by_distance, i, 0)), [&by_scale, &by_distance].map(|p| worst(p, i, 1)));
+        let (again, leaks) =
+            (worst(&by_scale, i, 0).max(worst(&by_distance, i, 0)), [&by_scale, &by_distance].map(|p| worst(p, i, 1)));
         outcome = if *scheme == Scheme::ErrorBound {
             outcome
                 .at_most("error bound: false hits, largest fraction", again, 0.0)

@@ -5,7 +5,9 @@ use std::f64::consts::TAU;
 use super::{Effort, NAMES, Named, Outcome, accelerators, aimed, point_on, seen};
 use crate::bench::stability::geometry::{Rng, grid, mesh, triangle, world};
 use crate::color::Rgb;
-use crate::geometry::{Analytic, Disk, Frustum, Geometry, Mesh, Profile, Quad, Revolution, Shape, Sphere, TransformedShape};
+use crate::geometry::{
+    Analytic, Disk, Frustum, Geometry, Mesh, Profile, Quad, Revolution, Shape, Sphere, TransformedShape,
+};
 use crate::id::{PrimId, ShapeId};
 use crate::light::{AreaLight, Emission};
 use crate::math::{DAffine3, DVec3, Transform};
@@ -15,7 +17,9 @@ const VALID: &str = "the emitters' parameters are valid";
 /// Convex emitters within about 1 of the origin.
 fn emitters() -> Vec<(&'static str, Shape)> {
     let placed = |shape| Shape::Analytic(TransformedShape::new(shape, Transform::IDENTITY));
-    let spindle = Profile::bezier(&[[0.0, -0.9], [0.5, -0.9], [0.8, -0.4], [0.8, 0.0], [0.8, 0.4], [0.5, 0.9], [0.0, 0.9]]).expect(VALID);
+    let spindle =
+        Profile::bezier(&[[0.0, -0.9], [0.5, -0.9], [0.8, -0.4], [0.8, 0.0], [0.8, 0.4], [0.5, 0.9], [0.0, 0.9]])
+            .expect(VALID);
     let corner = DVec3::new(-0.7, -0.5, 0.0);
     let (x, y) = (DVec3::X * 1.4, DVec3::Y);
     let kite = mesh(&[corner, corner + x, corner + x + 1.2 * y, corner + y], vec![[0, 1, 2], [0, 2, 3]]);
@@ -63,7 +67,8 @@ impl Room {
         let lowest = f64::from(turned.bounds().min.z);
         // The whole room turns, so that no plane is one of a coordinate.
         let room = DAffine3 { matrix3: rng.rotation(), translation: rng.cube() };
-        let [a, b, c] = [DVec3::new(-1.0, -1.0, 0.0), DVec3::new(1.0, -1.0, 0.0), DVec3::Y].map(|p| room.transform_point3(p));
+        let [a, b, c] =
+            [DVec3::new(-1.0, -1.0, 0.0), DVec3::new(1.0, -1.0, 0.0), DVec3::Y].map(|p| room.transform_point3(p));
         let floor = triangle(a, b, c);
         let emitter = mapped(&turned, room * DAffine3::from_translation(DVec3::Z * (distance - lowest)));
         Self { geometry: world(vec![Shape::Mesh(floor.clone()), emitter]), floor, n: room.matrix3.z_axis }
@@ -78,7 +83,10 @@ fn shadow_rays(rng: &mut Rng, emitter: &Shape, distance: f64, count: usize, coun
     for ((_, accel), [rays, occluded]) in accels.iter().zip(counts) {
         for _ in 0..count {
             let target = point_on(rng, &room.floor, PrimId(0));
-            let Some(si) = seen(&**accel, &room.geometry, &aimed(rng, target, room.n, (0.4 * distance).min(1.0))) else { continue };
+            let Some(si) = seen(&**accel, &room.geometry, &aimed(rng, target, room.n, (0.4 * distance).min(1.0)))
+            else {
+                continue;
+            };
             let light = &lights[rng.below(lights.len())];
             if si.shape != ShapeId(0) {
                 continue;
@@ -96,7 +104,9 @@ fn shadow_rays(rng: &mut Rng, emitter: &Shape, distance: f64, count: usize, coun
 
 fn report(outcome: Outcome, what: &str, counts: [[usize; 2]; NAMES.len()]) -> Outcome {
     NAMES.iter().zip(counts).fold(outcome, |outcome, (name, [rays, occluded])| {
-        outcome.at_least(format!("{what}, {name}: shadow rays"), rays as f64, 500.0).none(format!("{what}, {name}: occluded"), occluded)
+        outcome
+            .at_least(format!("{what}, {name}: shadow rays"), rays as f64, 500.0)
+            .none(format!("{what}, {name}: occluded"), occluded)
     })
 }
 

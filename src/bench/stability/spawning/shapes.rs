@@ -46,7 +46,8 @@ fn convex(rng: &mut Rng, kind: usize, size: f64) -> (Analytic, Option<DVec3>) {
     }
 }
 
-const CONVEX: [&str; 8] = ["sphere", "partial sphere", "cylinder", "cone", "frustum", "surface of revolution", "disk", "quad"];
+const CONVEX: [&str; 8] =
+    ["sphere", "partial sphere", "cylinder", "cone", "frustum", "surface of revolution", "disk", "quad"];
 
 /// The direction out of the shape at the unit normal `n` of its point `p`.
 fn outward(rng: &mut Rng, p: DVec3, n: DVec3, inside: Option<DVec3>) -> DVec3 {
@@ -125,7 +126,10 @@ pub(super) fn b9_quads(effort: Effort) -> Outcome {
             }
         }
     }
-    Outcome::new().at_least("rays", f64::from(rays), 10_000.0).none("found again", again).none("called occluded", occluded)
+    Outcome::new()
+        .at_least("rays", f64::from(rays), 10_000.0)
+        .none("found again", again)
+        .none("called occluded", occluded)
 }
 
 /// The shapes that a ray meets when it goes on from the float after each hit.
@@ -146,7 +150,8 @@ pub(super) fn b11_continue(effort: Effort) -> Outcome {
     // Far enough apart for any arithmetic, and at four floats between 2 and 4.
     for (spacing, what) in [(1.0, "1 apart"), (4.0 * f64::from(f32::EPSILON) * 2.0, "4 floats apart")] {
         let planes: Vec<[Shape; 2]> = (0..COUNT).map(|i| squares(100.0, 2.0 + spacing * i as f64)).collect();
-        let [analytic, triangles]: [Geometry; 2] = [0, 1].map(|k| world(planes.iter().map(|pair| pair[k].clone()).collect()));
+        let [analytic, triangles]: [Geometry; 2] =
+            [0, 1].map(|k| world(planes.iter().map(|pair| pair[k].clone()).collect()));
         for (geometry, shapes) in [(analytic, "quads"), (triangles, "triangles")] {
             for (kind, name) in AccelKind::ALL {
                 let accel = accel::build(kind, &geometry, 1).expect("accelerators build");

@@ -23,11 +23,17 @@ struct View {
 /// A white sphere that fills most of the picture. Either the camera or the sphere is at the world's origin.
 fn scene(View { radius, distance, camera_moves }: View, samples: usize, light: Value, strategy: &str) -> Value {
     let far = distance * radius;
-    let (camera, sphere) =
-        if camera_moves { ([far * 0.6, far * 0.48, far * 0.64], [0.0; 3]) } else { ([0.0; 3], [far * 0.6, far * 0.48, far * 0.64]) };
+    let (camera, sphere) = if camera_moves {
+        ([far * 0.6, far * 0.48, far * 0.64], [0.0; 3])
+    } else {
+        ([0.0; 3], [far * 0.6, far * 0.48, far * 0.64])
+    };
     json!({
         "film": { "width": 24, "height": 24, "filter": { "type": "box" } },
-        "camera": { "position": camera, "look_at": sphere, "up": [0, 0, 1], "vertical_fov_degrees": 2.1 * (1.0 / distance).asin().to_degrees() },
+        "camera": {
+            "position": camera, "look_at": sphere, "up": [0, 0, 1],
+            "vertical_fov_degrees": 2.1 * (1.0 / distance).asin().to_degrees()
+        },
         "sampler": { "type": "independent", "spp": samples },
         "integrator": { "type": "path", "max_depth": 2, "strategy": strategy },
         "materials": { "white": { "type": "diffuse", "albedo": 1.0 } },
@@ -55,7 +61,8 @@ pub(super) fn b10_spheres(effort: Effort) -> Outcome {
     // From the smallest radius to the others, by distance.
     let mut differences = [[0f64; 2]; DISTANCES.len()];
     for camera_moves in [false, true] {
-        let nearby = picture(&scene(View { radius: 1.0, distance: DISTANCES[0], camera_moves }, samples, sun.clone(), "light"));
+        let nearby =
+            picture(&scene(View { radius: 1.0, distance: DISTANCES[0], camera_moves }, samples, sun.clone(), "light"));
         for (distance, differences) in DISTANCES.into_iter().zip(&mut differences) {
             let pictures = RADII.map(|radius| {
                 let view = View { radius, distance, camera_moves };
@@ -75,10 +82,17 @@ pub(super) fn b10_spheres(effort: Effort) -> Outcome {
     Outcome::new()
         .at_most("under a sky: largest deviation of a pixel from white", off_white, 1e-5)
         .at_least("under a sun: lit pixels, of those from nearby", lit, 0.9)
-        .at_most("under a sun: relative RMSE between radii with the same digits", near[1].max(far[1]).max(farthest[1]), 0.0)
+        .at_most(
+            "under a sun: relative RMSE between radii with the same digits",
+            near[1].max(far[1]).max(farthest[1]),
+            0.0,
+        )
         .at_most("under a sun: relative RMSE between radii, 3 and 8000 radii away", near[0].max(far[0]), 0.01)
         // Half an ulp of each coordinate at 2e5 radii is up to 0.02 radii together, a quarter of a pixel: of the lit
         // rim, 36 of 576 pixels, a quarter comes or goes.
         .at_most("under a sun: relative RMSE between radii, 2e5 radii away", farthest[0], 0.1)
-        .short("at 2e5 radii the roundings of positions and directions to f32 move the sphere by up to a quarter of a pixel; the catalogue requires 1 %")
+        .short(
+            "at 2e5 radii the roundings of positions and directions to f32 move the sphere by up to a quarter of a \
+             pixel; the catalogue requires 1 %",
+        )
 }

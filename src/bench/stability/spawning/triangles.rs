@@ -69,7 +69,8 @@ pub(super) fn b5_slivers(effort: Effort) -> Outcome {
             outcome = report(outcome, &what, &tally);
             let retraces = tally[0].retraces_per_ray();
             let what = format!("{what}, embree: retraces per ray");
-            outcome = if aspect == 1.0 { outcome.at_most(what, retraces, 0.002) } else { outcome.record(what, retraces) };
+            outcome =
+                if aspect == 1.0 { outcome.at_most(what, retraces, 0.002) } else { outcome.record(what, retraces) };
         }
     }
     outcome
@@ -108,11 +109,10 @@ pub(super) fn b6_neighbours(effort: Effort) -> Outcome {
         }
     }
     let rays = f64::from(rays);
-    Outcome::new().at_least("rays", rays, 1_000.0).at_most("fraction with a false hit", falsely as f64 / rays, 1e-5).at_most(
-        "fraction called occluded",
-        occluded as f64 / rays,
-        1e-5,
-    )
+    Outcome::new()
+        .at_least("rays", rays, 1_000.0)
+        .at_most("fraction with a false hit", falsely as f64 / rays, 1e-5)
+        .at_most("fraction called occluded", occluded as f64 / rays, 1e-5)
 }
 
 pub(super) fn b8_large_ground(effort: Effort) -> Outcome {
@@ -120,7 +120,8 @@ pub(super) fn b8_large_ground(effort: Effort) -> Outcome {
     let mut outcome = Outcome::new();
     for size in [1e4, 1e5, 1e6] {
         let frame = rng.rotation() * size;
-        let [a, b, c] = [DVec3::new(-1.0, -0.8, 0.0), DVec3::new(1.1, -0.7, 0.0), DVec3::new(0.1, 1.2, 0.0)].map(|p| frame * p);
+        let [a, b, c] =
+            [DVec3::new(-1.0, -0.8, 0.0), DVec3::new(1.1, -0.7, 0.0), DVec3::new(0.1, 1.2, 0.0)].map(|p| frame * p);
         let geometry = meshes(vec![triangle(a, b, c)]);
         let Shape::Mesh(ground) = &geometry.shapes[0] else { return outcome };
         let n: DVec3 = ground.triangle_points(PrimId(0)).cross().normalize();

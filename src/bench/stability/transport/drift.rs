@@ -5,7 +5,9 @@ use super::{Effort, Outcome, Tests, prepare};
 use crate::accel::{self, AccelKind};
 use crate::bench::stability::Plot;
 use crate::film::{Crop, Film, FilmShape, LayerSet, LightAovRequest};
-use crate::integrator::{self, CameraBatch, CameraSample, PassContext, RenderContext, Setup, SurfaceAovs, Workspace, World, dimensions};
+use crate::integrator::{
+    self, CameraBatch, CameraSample, PassContext, RenderContext, Setup, SurfaceAovs, Workspace, World, dimensions,
+};
 use crate::math::Vec2;
 use crate::render::{Overrides, Settings};
 use crate::sampling::Sampler;
@@ -85,8 +87,10 @@ fn run(settings: &Settings, world: &World, to: u32) -> Option<Vec<Checkpoint>> {
     let integrator = integrator::build(&settings.integrator, setup);
     let mut film = Film::new(FilmShape::new([WIDTH; 2], Crop::full([WIDTH; 2]), LayerSet::COLOR), WIDTH).ok()?;
     let (mut sums, mut squares) = (vec![Sum::default(); COUNT], 0.0);
-    let (pass, mut workspace) =
-        (PassContext { world, render: RenderContext::new(world.scene, [WIDTH; 2], to), guide: None }, Workspace::default());
+    let (pass, mut workspace) = (
+        PassContext { world, render: RenderContext::new(world.scene, [WIDTH; 2], to), guide: None },
+        Workspace::default(),
+    );
     let (mut checkpoints, mut next) = (Vec::new(), 1);
     for first in (0..to).step_by(AT_ONCE as usize) {
         let samples = batch(world, &sampler, first);
@@ -110,7 +114,9 @@ pub(super) fn i12_drift(effort: Effort) -> Outcome {
     let prepared = prepare(&glowing_sphere(1, 64, 5), &Overrides { threads: Some(1), ..Overrides::default() });
     let Ok(accel) = accel::build(AccelKind::EMBREE, &prepared.scene.geometry, 1) else { return Outcome::new() };
     let world = World::new(&prepared.scene, &*accel);
-    let Some(checkpoints) = run(&prepared.settings, &world, effort.pick(10_000, 1_000_000)) else { return Outcome::new() };
+    let Some(checkpoints) = run(&prepared.settings, &world, effort.pick(10_000, 1_000_000)) else {
+        return Outcome::new();
+    };
 
     let (mut tests, mut rounding) = (Tests::new(), 0f64);
     let [mut distance, mut error, mut film] = [Vec::new(), Vec::new(), Vec::new()];
@@ -131,7 +137,11 @@ pub(super) fn i12_drift(effort: Effort) -> Outcome {
         x: "samples a pixel".into(),
         y: "distance".into(),
         floor: 1e-9,
-        curves: vec![("mean from 1".into(), distance), ("standard error".into(), error), ("film from the exact sum".into(), film)],
+        curves: vec![
+            ("mean from 1".into(), distance),
+            ("standard error".into(), error),
+            ("film from the exact sum".into(), film),
+        ],
     };
     // Half a unit in the last place of f32, in which pictures are, and a little for f64 sums.
     let bound = 0.5 * f64::from(f32::EPSILON) + 1e-9;

@@ -2,7 +2,9 @@
 
 use std::f64::consts::PI;
 
-use super::{Effort, Outcome, PIXELS, STRATEGIES, Tests, Value, json, mean, merge, pixels, render, scene, with_strategy};
+use super::{
+    Effort, Outcome, PIXELS, STRATEGIES, Tests, Value, json, mean, merge, pixels, render, scene, with_strategy,
+};
 
 /// Inside a closed sphere of albedo 1/2.
 pub(super) fn grey_sphere(spp: u32, max_depth: u32, rr_depth: u32) -> Value {
@@ -48,8 +50,11 @@ pub(super) fn i1_furnaces(effort: Effort) -> Outcome {
     let mut tests = Tests::new();
     for (camera, change) in cameras() {
         for sampler in ["independent", "sobol"] {
-            let furnaces =
-                [("glowing", glowing_sphere(spp, 64, 5)), ("one light", lit_sphere(spp, 1)), ("four lights", lit_sphere(spp, 4))];
+            let furnaces = [
+                ("glowing", glowing_sphere(spp, 64, 5)),
+                ("one light", lit_sphere(spp, 1)),
+                ("four lights", lit_sphere(spp, 4)),
+            ];
             for (furnace, mut scene) in furnaces {
                 merge(&mut scene, json!({ "camera": change, "sampler": { "type": sampler } }));
                 let name = format!("{furnace}, {camera}, {sampler}");
@@ -68,7 +73,13 @@ pub(super) fn i2_depth(effort: Effort) -> Outcome {
         for rr_depth in [1, 100] {
             for strategy in STRATEGIES {
                 let scene = with_strategy(&glowing_sphere(spp, depth as u32, rr_depth), strategy);
-                tests.mean(&format!("depth {depth}, roulette from {rr_depth}, {strategy}"), mean(&scene, 1), PIXELS, expected, 0.0);
+                tests.mean(
+                    &format!("depth {depth}, roulette from {rr_depth}, {strategy}"),
+                    mean(&scene, 1),
+                    PIXELS,
+                    expected,
+                    0.0,
+                );
             }
         }
     }
@@ -80,7 +91,12 @@ pub(super) fn i11_seen_directly(_: Effort) -> Outcome {
     let radiance = [3.5, 0.25, 1.0f32];
     let emission = json!({ "radiance": radiance });
     let shapes = [
-        ("quad", json!({ "shapes": [{ "type": "quad", "material": "black", "emission": emission, "transform": [{ "scale": 3 }] }] })),
+        (
+            "quad",
+            json!({
+                "shapes": [{ "type": "quad", "material": "black", "emission": emission, "transform": [{ "scale": 3 }] }]
+            }),
+        ),
         ("sphere", json!({ "shapes": [{ "type": "sphere", "material": "black", "radius": 2, "emission": emission }] })),
         ("disk", json!({ "shapes": [{ "type": "disk", "material": "black", "radius": 3, "emission": emission }] })),
         ("sky", json!({ "lights": [{ "type": "environment", "radiance": radiance }] })),

@@ -39,7 +39,8 @@ fn lamp(mut shape: Value) -> Value {
 
 pub(super) fn i4_disk(effort: Effort) -> Outcome {
     let disk = lamp(json!({
-        "type": "disk", "radius": 0.5, "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": 90 } }, { "translate": [0, 1, 0] }]
+        "type": "disk", "radius": 0.5,
+        "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": 90 } }, { "translate": [0, 1, 0] }]
     }));
     // F = (1 - (x² + h² - R²) / sqrt((x² + h² + R²)² - 4 R² x²)) / 2; 0.1107935 for x = 0.7.
     let share = |x: f64| {
@@ -47,22 +48,36 @@ pub(super) fn i4_disk(effort: Effort) -> Outcome {
         0.5 * (1.0 - (x2 + 1.0 - r2) / ((x2 + 1.0 + r2).powi(2) - 4.0 * r2 * x2).sqrt())
     };
     let mut tests = Tests::new();
-    let worst =
-        [0.0, 0.7].map(|x| compare(&mut tests, effort, &format!("x = {x}"), floor_probe([x, 0.0, 0.0], json!([disk])), PI * share(x)));
+    let worst = [0.0, 0.7].map(|x| {
+        compare(&mut tests, effort, &format!("x = {x}"), floor_probe([x, 0.0, 0.0], json!([disk])), PI * share(x))
+    });
     let form = (share(0.7) - 0.110_793_5).abs().max((share(0.0) - 0.2).abs());
-    judge(tests, effort, worst[0].max(worst[1])).at_most("distance of the formula from the catalogue's number", form, 1e-6)
+    judge(tests, effort, worst[0].max(worst[1])).at_most(
+        "distance of the formula from the catalogue's number",
+        form,
+        1e-6,
+    )
 }
 
 pub(super) fn i5_quad(effort: Effort) -> Outcome {
     let quad = lamp(json!({ "type": "quad", "origin": [-0.3, 1, -0.5], "edge_u": [1, 0, 0], "edge_v": [0, 0, 1] }));
     let mesh = lamp(json!({
-        "type": "mesh", "positions": [[-0.3, 1, -0.5], [0.7, 1, -0.5], [0.7, 1, 0.5], [-0.3, 1, 0.5]], "triangles": [[0, 1, 2], [0, 2, 3]]
+        "type": "mesh", "positions": [[-0.3, 1, -0.5], [0.7, 1, -0.5], [0.7, 1, 0.5], [-0.3, 1, 0.5]],
+        "triangles": [[0, 1, 2], [0, 2, 3]]
     }));
-    let one = lamp(json!({ "type": "mesh", "positions": [[-0.3, 1, -0.5], [0.7, 1, -0.5], [0.7, 1, 0.5]], "triangles": [[0, 1, 2]] }));
-    let other = lamp(json!({ "type": "mesh", "positions": [[-0.3, 1, -0.5], [0.7, 1, 0.5], [-0.3, 1, 0.5]], "triangles": [[0, 1, 2]] }));
-    let sheared = lamp(json!({ "type": "quad", "origin": [-0.6, 0.8, -0.4], "edge_u": [0.9, 0.3, 0.2], "edge_v": [0.3, 0, 0.8] }));
-    let exact = lambert(&[[-0.6, 0.8, -0.4], [0.3, 1.1, -0.2], [0.6, 1.1, 0.6], [-0.3, 0.8, 0.4]].map(DVec3::from), DVec3::Y);
-    let square = lambert(&[[-0.3, 1.0, -0.5], [0.7, 1.0, -0.5], [0.7, 1.0, 0.5], [-0.3, 1.0, 0.5]].map(DVec3::from), DVec3::Y);
+    let one = lamp(json!({
+        "type": "mesh", "positions": [[-0.3, 1, -0.5], [0.7, 1, -0.5], [0.7, 1, 0.5]], "triangles": [[0, 1, 2]]
+    }));
+    let other = lamp(json!({
+        "type": "mesh", "positions": [[-0.3, 1, -0.5], [0.7, 1, 0.5], [-0.3, 1, 0.5]], "triangles": [[0, 1, 2]]
+    }));
+    let sheared = lamp(
+        json!({ "type": "quad", "origin": [-0.6, 0.8, -0.4], "edge_u": [0.9, 0.3, 0.2], "edge_v": [0.3, 0, 0.8] }),
+    );
+    let exact =
+        lambert(&[[-0.6, 0.8, -0.4], [0.3, 1.1, -0.2], [0.6, 1.1, 0.6], [-0.3, 0.8, 0.4]].map(DVec3::from), DVec3::Y);
+    let square =
+        lambert(&[[-0.3, 1.0, -0.5], [0.7, 1.0, -0.5], [0.7, 1.0, 0.5], [-0.3, 1.0, 0.5]].map(DVec3::from), DVec3::Y);
     let mut tests = Tests::new();
     let worst = [
         compare(&mut tests, effort, "quad", floor_probe([0.0; 3], json!([quad])), square),
@@ -71,16 +86,26 @@ pub(super) fn i5_quad(effort: Effort) -> Outcome {
         compare(&mut tests, effort, "sheared", floor_probe([0.0; 3], json!([sheared])), exact),
     ];
     let form = (square - 0.718_688_9).abs();
-    judge(tests, effort, worst.into_iter().fold(0.0, f64::max)).at_most("distance of the formula from the catalogue's number", form, 1e-6)
+    judge(tests, effort, worst.into_iter().fold(0.0, f64::max)).at_most(
+        "distance of the formula from the catalogue's number",
+        form,
+        1e-6,
+    )
 }
 
 pub(super) fn i6_sphere(effort: Effort) -> Outcome {
-    let sphere =
-        |radius: f64, center: [f64; 3]| lamp(json!({ "type": "sphere", "radius": radius, "transform": [{ "translate": center }] }));
+    let sphere = |radius: f64, center: [f64; 3]| {
+        lamp(json!({ "type": "sphere", "radius": radius, "transform": [{ "translate": center }] }))
+    };
     // Half the size, doubled and mirrored; and cut in two, which is sampled by area.
-    let placed = lamp(json!({ "type": "sphere", "radius": 0.25, "transform": [{ "scale": [2, -2, 2] }, { "translate": [1.2, 1.6, 0] }] }));
+    let placed = lamp(json!({
+        "type": "sphere", "radius": 0.25, "transform": [{ "scale": [2, -2, 2] }, { "translate": [1.2, 1.6, 0] }]
+    }));
     let half = |from: f64, to: f64| {
-        lamp(json!({ "type": "sphere", "radius": 0.5, "z_min": from, "z_max": to, "transform": [{ "translate": [1.2, 1.6, 0] }] }))
+        lamp(json!({
+            "type": "sphere", "radius": 0.5, "z_min": from, "z_max": to,
+            "transform": [{ "translate": [1.2, 1.6, 0] }]
+        }))
     };
     // pi (R / d)² cos: 0.1570796 for R = 0.5, d = 2, cos = 0.8.
     let expected = PI * 0.0625 * 0.8;
@@ -88,8 +113,20 @@ pub(super) fn i6_sphere(effort: Effort) -> Outcome {
     let worst = [
         compare(&mut tests, effort, "sphere", floor_probe([0.0; 3], json!([sphere(0.5, [1.2, 1.6, 0.0])])), expected),
         compare(&mut tests, effort, "scaled", floor_probe([0.0; 3], json!([placed])), expected),
-        compare(&mut tests, effort, "two parts", floor_probe([0.0; 3], json!([half(-0.5, 0.1), half(0.1, 0.5)])), expected),
-        compare(&mut tests, effort, "overhead", floor_probe([0.0; 3], json!([sphere(0.5, [0.0, 1.0, 0.0])])), PI * 0.25),
+        compare(
+            &mut tests,
+            effort,
+            "two parts",
+            floor_probe([0.0; 3], json!([half(-0.5, 0.1), half(0.1, 0.5)])),
+            expected,
+        ),
+        compare(
+            &mut tests,
+            effort,
+            "overhead",
+            floor_probe([0.0; 3], json!([sphere(0.5, [0.0, 1.0, 0.0])])),
+            PI * 0.25,
+        ),
     ];
     judge(tests, effort, worst.into_iter().fold(0.0, f64::max))
 }
@@ -105,13 +142,18 @@ fn slab(spp: u32, back: f64, front: f64) -> Value {
             "materials": { "glass": { "type": "dielectric", "ior": 1.5 }, "black": { "type": "diffuse", "albedo": 0 } },
             "shapes": [
                 { "type": "quad", "material": "glass", "transform": [{ "translate": [0, 0, 0.25] }] },
-                { "type": "quad", "material": "glass", "reverse_normal": true, "transform": [{ "translate": [0, 0, -0.25] }] },
+                {
+                    "type": "quad", "material": "glass", "reverse_normal": true,
+                    "transform": [{ "translate": [0, 0, -0.25] }]
+                },
             ]
         }),
     );
     for (z, radiance, turned) in [(-1.0, back, false), (4.0, front, true)] {
-        let lamp = json!({ "type": "quad", "material": "black", "emission": { "radiance": [radiance, radiance, radiance] }, "reverse_normal": turned,
-            "transform": [{ "translate": [0, 0, z] }] });
+        let lamp = json!({
+            "type": "quad", "material": "black", "emission": { "radiance": [radiance, radiance, radiance] },
+            "reverse_normal": turned, "transform": [{ "translate": [0, 0, z] }]
+        });
         if let Some(shapes) = scene["shapes"].as_array_mut() {
             shapes.push(lamp);
         }

@@ -33,7 +33,8 @@ pub(super) fn i9_alpha(effort: Effort) -> Outcome {
     let (mut tests, mut diagonals) = (Tests::new(), Tests::new());
     for (kind, name) in kinds {
         for layers in [1, 2, 4, 6] {
-            let prepared = prepare(&stack(effort.pick(64, 2048), layers), &Overrides { threads: Some(2), ..Overrides::default() });
+            let prepared =
+                prepare(&stack(effort.pick(64, 2048), layers), &Overrides { threads: Some(2), ..Overrides::default() });
             let image = render_with(&prepared, kind).image;
             let expected = 0.5f64.powi(layers as i32);
             tests.mean(&format!("{name}, {layers} layers"), Estimate::of(&image, 1), PIXELS, expected, 0.0);
@@ -61,7 +62,10 @@ fn before_a_sky(spp: u32, rest: Value) -> Value {
     let mut scene = scene(
         spp,
         json!({
-            "camera": { "type": "orthographic", "view_height": 3, "vertical_fov_degrees": null, "position": [1, 0, 6], "look_at": [1, 0, 0] },
+            "camera": {
+                "type": "orthographic", "view_height": 3, "vertical_fov_degrees": null, "position": [1, 0, 6],
+                "look_at": [1, 0, 0]
+            },
             "integrator": { "type": "path", "max_depth": 2 },
             "materials": { "black": { "type": "diffuse", "albedo": 0 } },
             "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
@@ -81,8 +85,14 @@ fn moving(distance: f64) -> Vec<(&'static str, Value)> {
         "positions": corners(0.0), "deform_positions": [corners(distance)] });
     vec![
         ("shape", json!({ "shapes": [shape] })),
-        ("instance", json!({ "objects": { "o": { "shapes": [card()] } }, "instances": [{ "object": "o", "motion": path }] })),
-        ("shape in an instance", json!({ "objects": { "o": { "shapes": [shape] } }, "instances": [{ "object": "o" }] })),
+        (
+            "instance",
+            json!({ "objects": { "o": { "shapes": [card()] } }, "instances": [{ "object": "o", "motion": path }] }),
+        ),
+        (
+            "shape in an instance",
+            json!({ "objects": { "o": { "shapes": [shape] } }, "instances": [{ "object": "o" }] }),
+        ),
         ("mesh", json!({ "shapes": [mesh] })),
     ]
 }

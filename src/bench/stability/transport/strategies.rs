@@ -13,9 +13,15 @@ fn plate(spp: u32, side: u32, alpha: f64, radius: f64) -> Value {
             "film": { "width": side, "height": side },
             "camera": { "position": [0, 3, 3], "look_at": [0, 0, 0], "vertical_fov_degrees": 0.01 },
             "integrator": { "type": "path", "max_depth": 2 },
-            "materials": { "metal": { "type": "conductor", "metal": "silver", "alpha": alpha }, "black": { "type": "diffuse", "albedo": 0 } },
+            "materials": {
+                "metal": { "type": "conductor", "metal": "silver", "alpha": alpha },
+                "black": { "type": "diffuse", "albedo": 0 }
+            },
             "shapes": [
-                { "type": "quad", "material": "metal", "origin": [-9, 0, 9], "edge_u": [18, 0, 0], "edge_v": [0, 0, -18] },
+                {
+                    "type": "quad", "material": "metal", "origin": [-9, 0, 9], "edge_u": [18, 0, 0],
+                    "edge_v": [0, 0, -18]
+                },
                 { "type": "sphere", "radius": radius, "material": "black", "emission": { "radiance": [1, 1, 1] },
                   "transform": [{ "translate": [0.1, 3, -3.2] }] }
             ]
@@ -32,7 +38,8 @@ pub(super) fn i7_strategies(effort: Effort) -> Outcome {
     for alpha in [0.03, 0.1, 0.3, 0.7] {
         for radius in [0.1, 1.0] {
             let scene = plate(spp, side, alpha, radius);
-            let found: Vec<Estimate> = STRATEGIES.iter().map(|strategy| mean(&with_strategy(&scene, strategy), 0)).collect();
+            let found: Vec<Estimate> =
+                STRATEGIES.iter().map(|strategy| mean(&with_strategy(&scene, strategy), 0)).collect();
             let name = format!("alpha {alpha}, lamp {radius}");
             let [mis, light, bsdf] = [found[0], found[1], found[2]];
             tests.same(&format!("{name}: both and light"), mis, light, pixels);
@@ -62,7 +69,8 @@ pub(super) fn i7_strategies(effort: Effort) -> Outcome {
         .at_most(format!("variance of both over its bound ({at})"), worst, noise)
         .record(format!("variance of both over the lesser of one ({ratio_at})"), ratio)
         .short(
-            "1.1 times the lesser variance is asked everywhere: a strategy that is good already is exceeded by more, since light sampling gets \
-             its share of the weight where both densities are alike, as in the tail of a sharp lobe within a large lamp",
+            "1.1 times the lesser variance is asked everywhere: a strategy that is good already is exceeded by more, \
+             since light sampling gets its share of the weight where both densities are alike, as in the tail of a \
+             sharp lobe within a large lamp",
         )
 }

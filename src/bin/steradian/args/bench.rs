@@ -11,9 +11,10 @@ use super::{accel_help, bench_error, bench_scale, parse_size};
 const BENCH_REPORTS_ABOUT: &str = "\
 Reproduce the comparisons of linear loops, octree, kd-tree and BVH in course reports, and explain the ratios
 
-Three pictures of normals on one thread: a head of 968 triangles (\"120 s linear, 3.5 s octree, 0.5 s Embree\"), a mesh of 1,000 triangles (\"kd-tree \
-about 10 times faster\"), one of 70,000 (\"BVH 17.61 times faster\"). Each is drawn with the accelerators as the reports wrote them, with Steradian's and with \
-Embree. Where every triangle is tested, a smaller picture is timed and its time scaled up, unless --full is given.";
+Three pictures of normals on one thread: a head of 968 triangles (\"120 s linear, 3.5 s octree, 0.5 s Embree\"), a \
+mesh of 1,000 triangles (\"kd-tree about 10 times faster\"), one of 70,000 (\"BVH 17.61 times faster\"). Each is drawn \
+with the accelerators as the reports wrote them, with Steradian's and with Embree. Where every triangle is tested, a \
+smaller picture is timed and its time scaled up, unless --full is given.";
 
 const BENCH_ACCEL_EXAMPLES: &str = "\
 Examples:
@@ -26,8 +27,10 @@ Examples:
   steradian bench accel scene.json --accel linear,embree --ray=0,0,5,0,0,-1
       The hit of each accelerator for one ray: origin, direction, and optionally t_min, t_max, time.
 
-Rays are recorded once from a render of the scene with one sample a pixel: camera, shadow (any hit), first bounce, deep bounce, ambient occlusion
-(any hit). Every accelerator traces the very same rays, in turn, round after round. Hits are compared with those of linear.
+Rays are recorded once from a render of the scene with one sample a pixel: camera, shadow (any hit), first bounce, \
+deep bounce, ambient occlusion
+(any hit). Every accelerator traces the very same rays, in turn, round after round. Hits are compared with those of \
+linear.
 Ctrl-C ends after the present step and reports what there is.";
 
 /// What to measure.
@@ -56,9 +59,10 @@ pub enum BenchCommand {
 const BENCH_STABILITY_ABOUT: &str = "\
 Check numerical stability: every check with its criterion and what was measured.
 
-Shapes from a thousandth to a million radii away, rays that leave surfaces of every size anywhere, closed meshes that must not leak, accelerators \
-against testing everything, sampled directions against their densities, lights, cameras and films against closed forms. A check that falls short gives \
-the reason; one that fails ends the run with exit code 1 and leaves pictures of what it found in DIR/evidence.";
+Shapes from a thousandth to a million radii away, rays that leave surfaces of every size anywhere, closed meshes that \
+must not leak, accelerators against testing everything, sampled directions against their densities, lights, cameras \
+and films against closed forms. A check that falls short gives the reason; one that fails ends the run with exit code \
+1 and leaves pictures of what it found in DIR/evidence.";
 
 const BENCH_STABILITY_EXAMPLES: &str = "\
 Examples:
@@ -128,7 +132,12 @@ pub struct BenchAccelArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', long_help = accel_help())]
     pub accel: Vec<AccelKind>,
     /// Rays of each kind, about
-    #[arg(long, value_name = "N", default_value_t = 250_000, value_parser = clap::value_parser!(u32).range(16..=100_000_000))]
+    #[
+        arg(
+            long, value_name = "N", default_value_t = 250_000,
+            value_parser = clap::value_parser!(u32).range(16..=100_000_000)
+        )
+    ]
     pub rays: u32,
     /// Numbers of threads. Default: 1 and all
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=1024))]
@@ -156,5 +165,6 @@ pub struct BenchAccelArgs {
 fn parse_range(text: &str) -> Result<[usize; 2], String> {
     let number = |word: &str| word.trim().parse::<f64>().ok().filter(|n| (100.0..=1e9).contains(n)).map(|n| n as usize);
     let ends = text.split_once("..").and_then(|(from, to)| Some([number(from)?, number(to)?]));
-    ends.filter(|[from, to]| from <= to).ok_or_else(|| "expected two numbers of triangles from 100 to 1e9, such as 1e3..1e7".to_owned())
+    ends.filter(|[from, to]| from <= to)
+        .ok_or_else(|| "expected two numbers of triangles from 100 to 1e9, such as 1e3..1e7".to_owned())
 }

@@ -13,9 +13,9 @@ use crate::names;
 pub const ABOUT: &str = "\
 Measure error against time: variants of a render, and other renderers, beside a reference
 
-Renders the scene with every variant and every number of samples (or seconds), several times in turn, each time with another seed, and compares each \
-picture with the reference: relMSE, MSE, FLIP, bias, NaN; samples and rays per second; how fast the error falls; the time that each variant takes to \
-the same error.";
+Renders the scene with every variant and every number of samples (or seconds), several times in turn, each time with \
+another seed, and compares each picture with the reference: relMSE, MSE, FLIP, bias, NaN; samples and rays per second; \
+how fast the error falls; the time that each variant takes to the same error.";
 
 pub const EXAMPLES: &str = "\
 Examples:
@@ -25,13 +25,17 @@ Examples:
       Four variants side by side.
   steradian bench error cornell.json --times 1,2,4,8 --integrator path --clamp 10
       By time. Without a reference two renders of our own stand in.
-  steradian bench error cornell.xml --reference cornell.exr --external 'mitsuba=mitsuba -m llvm_ad_rgb -Dspp={spp} -o {out} {scene}'
-      Beside another program. {scene} and {out} come quoted for the shell; {seed} is there too, and {seconds} with --times. Its time is what it
-      prints as JSON, as {\"render_seconds\": 1.5} or {\"runs\": [{\"render_s\": [1.5]}]}, else that of its whole process.
+  steradian bench error cornell.xml --reference cornell.exr --external 'mitsuba=mitsuba -m llvm_ad_rgb -Dspp={spp} -o \
+{out} {scene}'
+      Beside another program. {scene} and {out} come quoted for the shell; {seed} is there too, and {seconds} with \
+--times. Its time is what it
+      prints as JSON, as {\"render_seconds\": 1.5} or {\"runs\": [{\"render_s\": [1.5]}]}, else that of its whole \
+process.
   steradian bench error cornell.json --reference cornell.exr --spp 16 --tax
       How much of the time is tracing: the render's own rays, traced by bare calls of Embree.
 
-How to read it: of two variants with slopes of about -1 the one with the higher efficiency is the better, by the ratio of the two; a mean ratio whose
+How to read it: of two variants with slopes of about -1 the one with the higher efficiency is the better, by the ratio \
+of the two; a mean ratio whose
 interval leaves out 1 is a bias, or the reference's. Ctrl-C leaves what there is.";
 
 /// Arguments of `bench error`.
@@ -43,7 +47,12 @@ pub struct BenchErrorArgs {
     #[arg(long, value_name = "REF")]
     pub reference: Option<PathBuf>,
     /// Samples per pixel
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "1,4,16,64,256", value_parser = clap::value_parser!(u32).range(1..))]
+    #[
+        arg(
+            long, value_name = "LIST", value_delimiter = ',', default_value = "1,4,16,64,256",
+            value_parser = clap::value_parser!(u32).range(1..)
+        )
+    ]
     pub spp: Vec<u32>,
     /// Seconds, in place of samples per pixel
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_seconds, conflicts_with = "spp")]
@@ -57,13 +66,28 @@ pub struct BenchErrorArgs {
     pub tax: bool,
 
     /// Algorithms
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = names::tagged::<IntegratorDesc>(), help_heading = "Variants")]
+    #[
+        arg(
+            long, value_name = "LIST", value_delimiter = ',', value_parser = names::tagged::<IntegratorDesc>(),
+            help_heading = "Variants"
+        )
+    ]
     pub integrator: Vec<IntegratorDesc>,
     /// How samples are chosen
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = names::plain::<SamplerKindDesc>(), help_heading = "Variants")]
+    #[
+        arg(
+            long, value_name = "LIST", value_delimiter = ',', value_parser = names::plain::<SamplerKindDesc>(),
+            help_heading = "Variants"
+        )
+    ]
     pub sampler: Vec<SamplerKindDesc>,
     /// How directions towards lights are found
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = names::plain::<StrategyDesc>(), help_heading = "Variants")]
+    #[
+        arg(
+            long, value_name = "LIST", value_delimiter = ',', value_parser = names::plain::<StrategyDesc>(),
+            help_heading = "Variants"
+        )
+    ]
     pub strategy: Vec<StrategyDesc>,
     /// Whether paths learn where light comes from: on, off or both
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_switch, help_heading = "Variants")]
@@ -115,5 +139,9 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
 fn parse_external(text: &str) -> Result<(String, String), String> {
     let (name, command) = text.split_once('=').ok_or_else(|| "expected NAME=COMMAND".to_owned())?;
     let (name, command) = (name.trim(), command.trim());
-    if name.is_empty() || command.is_empty() { Err("expected NAME=COMMAND".into()) } else { Ok((name.to_owned(), command.to_owned())) }
+    if name.is_empty() || command.is_empty() {
+        Err("expected NAME=COMMAND".into())
+    } else {
+        Ok((name.to_owned(), command.to_owned()))
+    }
 }

@@ -10,17 +10,20 @@ use super::{accel_help, parse_size};
 pub const ABOUT: &str = "\
 Measure time and memory as pictures and scenes grow
 
-Renders scenes that it makes itself, with more and more pixels, samples, triangles (up to 20 million, all different), instances, lights, segments of \
-paths, layers and threads: seconds to load, to build and to the first picture, samples per second, bytes of meshes, accelerator and film, and the \
-most memory that the process held. The exponent of a power law is fitted to each cost.";
+Renders scenes that it makes itself, with more and more pixels, samples, triangles (up to 20 million, all different), \
+instances, lights, segments of paths, layers and threads: seconds to load, to build and to the first picture, samples \
+per second, bytes of meshes, accelerator and film, and the most memory that the process held. The exponent of a power \
+law is fitted to each cost.";
 
 pub const EXAMPLES: &str = "\
 Examples:
-  steradian bench scale --out scale              Everything: scale.html with plots, scale.md, scale.csv, scale.json; about 5 minutes of two cores, 3 GB
+  steradian bench scale --out scale              Everything: scale.html with plots, scale.md, scale.csv, scale.json; \
+about 5 minutes of two cores, 3 GB
   steradian bench scale --quick                  Up to 1 million triangles: a minute or two
   steradian bench scale threads --repeat 5       One sweep
 
-Sweeps: resolution, spp, triangles, instances, lights, depth, layers, threads. Every case runs in a process of its own, so that the most memory it held
+Sweeps: resolution, spp, triangles, instances, lights, depth, layers, threads. Every case runs in a process of its \
+own, so that the most memory it held
 is its own. Ctrl-C ends the case under way and reports what there is.";
 
 /// Arguments of `bench scale`.

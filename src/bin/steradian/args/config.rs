@@ -5,17 +5,17 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 const SHOW_EXAMPLES: &str = "\
-Options of render may be given, the strongest first, on the command line; in the environment (STERADIAN_SPP for --spp, STERADIAN_MAX_DEPTH for \
---max-depth); in steradian.toml in the scene's folder; in $XDG_CONFIG_HOME/steradian/config.toml (or ~/.config/...); in the scene. Keys of files \
-are the options without dashes:
+Options of render may be given, the strongest first, on the command line; in the environment (STERADIAN_SPP for --spp, \
+STERADIAN_MAX_DEPTH for --max-depth); in steradian.toml in the scene's folder; in \
+$XDG_CONFIG_HOME/steradian/config.toml (or ~/.config/...); in the scene. Keys of files are the options without dashes:
 
   spp = 256
   threads = 8
   layers = [\"Z\", \"albedo\"]
   float = true
 
-steradian.toml sets what the picture is; what is loaded, written or connected to (output, oidn-library, log-file, tev, preview, ...) belongs to \
-the other places. Files of other users than you and root are not read.
+steradian.toml sets what the picture is; what is loaded, written or connected to (output, oidn-library, log-file, tev, \
+preview, ...) belongs to the other places. Files of other users than you and root are not read.
 
 Examples:
   steradian config show --origin room.json       Also where each value comes from

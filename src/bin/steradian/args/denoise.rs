@@ -10,9 +10,10 @@ use crate::names;
 pub const ABOUT: &str = "\
 Denoise an EXR file with Intel Open Image Denoise
 
-The colour of any renderer's EXR file is denoised, with the help of its layers of albedo and normals: Steradian's (feature_albedo, feature_normal), else those \
-of Blender (Denoising Albedo, Denoising Normal), pbrt (Albedo, Ns, N), Mitsuba (albedo, sh_normal). They are denoised first. Light groups (light_NAME) \
-that add up to the colour still do so afterwards. All other layers and attributes stay as they are; the colour as it was becomes layer noisy.";
+The colour of any renderer's EXR file is denoised, with the help of its layers of albedo and normals: Steradian's \
+(feature_albedo, feature_normal), else those of Blender (Denoising Albedo, Denoising Normal), pbrt (Albedo, Ns, N), \
+Mitsuba (albedo, sh_normal). They are denoised first. Light groups (light_NAME) that add up to the colour still do so \
+afterwards. All other layers and attributes stay as they are; the colour as it was becomes layer noisy.";
 
 pub const EXAMPLES: &str = "\
 Examples:
@@ -73,7 +74,12 @@ pub struct DenoiseArgs {
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
     pub exposure: f32,
     /// PNG: how light becomes colours of the display
-    #[arg(long, value_name = "NAME", default_value = ViewDesc::default().name(), value_parser = names::plain::<ViewDesc>())]
+    #[
+        arg(
+            long, value_name = "NAME", default_value = ViewDesc::default().name(),
+            value_parser = names::plain::<ViewDesc>()
+        )
+    ]
     pub view: ViewDesc,
     /// Number of threads; 0 means all
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Run")]

@@ -8,10 +8,12 @@ use steradian::farm::FrameList;
 const SLURM_ABOUT: &str = "\
 Write a job for Slurm: an array of shards for every frame, and a job that merges them
 
-The folder gets render.sh (one task of the array renders one shard), merge.sh and submit.sh, which submits both for each frame; all may be edited. \
-Scene, folder and outputs have to mean the same on every node. Every shard has samples of its own of every pixel; merged, they are the picture of one \
-machine bit for bit. A task whose node is lost, which is preempted or reaches its time limit is queued again and goes on from its checkpoint; one that \
-fails is rendered again up to --retries times, unless the exit code is that of a permanent failure (2, 3, 4, 6). submit.sh, run again, submits what is missing.";
+The folder gets render.sh (one task of the array renders one shard), merge.sh and submit.sh, which submits both for \
+each frame; all may be edited. Scene, folder and outputs have to mean the same on every node. Every shard has samples \
+of its own of every pixel; merged, they are the picture of one machine bit for bit. A task whose node is lost, which \
+is preempted or reaches its time limit is queued again and goes on from its checkpoint; one that fails is rendered \
+again up to --retries times, unless the exit code is that of a permanent failure (2, 3, 4, 6). submit.sh, run again, \
+submits what is missing.";
 
 const SLURM_EXAMPLES: &str = "\
 Examples:

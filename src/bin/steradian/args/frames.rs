@@ -8,7 +8,12 @@ use steradian::farm::{FORMATS, FrameList, ProgressFormat};
 #[derive(Clone, Debug, Default, Args)]
 pub struct SequenceArgs {
     /// The format of progress on stderr. Default: human on a terminal, plain elsewhere
-    #[arg(long, value_name = "FORMAT", value_parser = formats(), long_help = progress_help(), help_heading = "Messages")]
+    #[
+        arg(
+            long, value_name = "FORMAT", value_parser = formats(), long_help = progress_help(),
+            help_heading = "Messages"
+        )
+    ]
     pub progress: Option<&'static ProgressFormat>,
     /// Render these frames: 1-100, 1-100x5 (every fifth), 3,7,9-12
     ///
@@ -19,7 +24,12 @@ pub struct SequenceArgs {
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true, help_heading = "Frames")]
     pub frames: Option<FrameList>,
     /// Frames in a second, for the animations of glTF files
-    #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = parse_fps, requires = "frames", help_heading = "Frames")]
+    #[
+        arg(
+            long, value_name = "N", default_value_t = 24.0, value_parser = parse_fps, requires = "frames",
+            help_heading = "Frames"
+        )
+    ]
     pub fps: f64,
     /// Render frames whose files exist, too; they are skipped otherwise
     #[arg(long, requires = "frames", help_heading = "Frames")]
@@ -40,5 +50,8 @@ fn progress_help() -> String {
 }
 
 fn parse_fps(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|fps: &f64| *fps > 0.0 && fps.is_finite()).ok_or_else(|| "expected a number above 0".to_owned())
+    text.parse()
+        .ok()
+        .filter(|fps: &f64| *fps > 0.0 && fps.is_finite())
+        .ok_or_else(|| "expected a number above 0".to_owned())
 }

@@ -9,7 +9,12 @@ use steradian::import::ImportOptions;
 #[derive(Clone, Debug, Default, Args)]
 pub struct ImportArgs {
     /// Mitsuba: set $NAME to VALUE; repeat for several
-    #[arg(short = 'D', long = "define", value_name = "NAME=VALUE", value_parser = parse_define, help_heading = "Import")]
+    #[
+        arg(
+            short = 'D', long = "define", value_name = "NAME=VALUE", value_parser = parse_define,
+            help_heading = "Import"
+        )
+    ]
     pub defines: Vec<(String, String)>,
     /// glTF: seconds into the animations
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true, help_heading = "Import")]

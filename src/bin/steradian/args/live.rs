@@ -15,7 +15,12 @@ pub struct LiveArgs {
     ///
     /// A viewer that is not there, comes later, is slow or ends does not disturb the render; it gets the newest picture
     /// once it is connected.
-    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = DEFAULT_ADDRESS, value_parser = parse_address)]
+    #[
+        arg(
+            long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = DEFAULT_ADDRESS,
+            value_parser = parse_address
+        )
+    ]
     pub tev: Option<String>,
     /// Serve a web page that shows the picture as it grows, at this port; 0 for any free port
     ///
@@ -48,7 +53,8 @@ impl LiveArgs {
 }
 
 fn parse_address(text: &str) -> Result<String, String> {
-    let port = text.rsplit_once(':').filter(|(host, _)| !host.is_empty()).and_then(|(_, port)| port.parse::<u16>().ok());
+    let port =
+        text.rsplit_once(':').filter(|(host, _)| !host.is_empty()).and_then(|(_, port)| port.parse::<u16>().ok());
     match port {
         Some(1..) => Ok(text.to_owned()),
         _ => Err("expected HOST:PORT (put the scene before --tev)".to_owned()),

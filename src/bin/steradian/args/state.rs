@@ -27,7 +27,12 @@ pub struct StateArgs {
     #[arg(long, value_name = "FILE", help_heading = "State")]
     pub checkpoint: Option<PathBuf>,
     /// Write the checkpoint at least this often
-    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, default_value = "60", requires = "checkpoint", help_heading = "State")]
+    #[
+        arg(
+            long, value_name = "SECONDS", value_parser = parse_seconds, default_value = "60", requires = "checkpoint",
+            help_heading = "State"
+        )
+    ]
     pub every: Duration,
     /// Continue from the checkpoint if there is one; the picture is the same bit for bit as without the interruption
     #[arg(long, requires = "checkpoint", help_heading = "State")]

@@ -44,9 +44,11 @@ mod tests {
     #[test]
     fn keys_are_options_and_values_what_they_take() {
         let found = parsed(
-            "# project\nspp = 64\ntarget_error = 1e-3\nsize = \"64x32\"\ncrop = [1, 2, 3, 4]\noutput = [\"a.exr\", \"b.png\"]\nguiding = true\nfloat = true\n",
+            "# project\nspp = 64\ntarget_error = 1e-3\nsize = \"64x32\"\ncrop = [1, 2, 3, 4]\n\
+             output = [\"a.exr\", \"b.png\"]\nguiding = true\nfloat = true\n",
         );
-        let found: Vec<_> = found.unwrap().into_iter().map(|s| format!("{}={} {}", s.key, s.values.join(";"), s.origin)).collect();
+        let found: Vec<_> =
+            found.unwrap().into_iter().map(|s| format!("{}={} {}", s.key, s.values.join(";"), s.origin)).collect();
         let expected = [
             "spp=64 s.toml:2",
             "target-error=1e-3 s.toml:3",
@@ -73,7 +75,8 @@ mod tests {
                 ("crop", _) => "[0, 0, 1, 1]".to_owned(),
                 ("tev", _) => "\"localhost:1\"".to_owned(),
                 _ => {
-                    let names: Vec<String> = arg.get_possible_values().iter().map(|value| format!("\"{}\"", value.get_name())).collect();
+                    let names: Vec<String> =
+                        arg.get_possible_values().iter().map(|value| format!("\"{}\"", value.get_name())).collect();
                     names.first().cloned().unwrap_or_else(|| "1".to_owned())
                 }
             };
@@ -86,8 +89,16 @@ mod tests {
                 refused => {
                     let message = refused.unwrap_err();
                     let variable = format!("STERADIAN_{}", key.to_uppercase().replace('-', "_"));
-                    assert!(!expected && message.starts_with(&format!("s.toml:1: \"{key}\" is not for a project's file")), "{message}");
-                    assert!([format!("--{key}"), variable, "config.toml".into()].iter().all(|place| message.contains(place)), "{message}");
+                    assert!(
+                        !expected && message.starts_with(&format!("s.toml:1: \"{key}\" is not for a project's file")),
+                        "{message}"
+                    );
+                    assert!(
+                        [format!("--{key}"), variable, "config.toml".into()]
+                            .iter()
+                            .all(|place| message.contains(place)),
+                        "{message}"
+                    );
                 }
             }
         }
@@ -113,8 +124,8 @@ mod tests {
     /// found.
     #[test]
     fn damaged_files_are_read_or_refused() {
-        const TEXT: &str =
-            "# a\nspp = 64\nlayers = [\"Z\", \"N\"]\nsize = \"8x8\"\nexposure = -1.5e1\nfloat = true\nseed = 0x10\ncomments = 1979-05-27\n";
+        const TEXT: &str = "# a\nspp = 64\nlayers = [\"Z\", \"N\"]\nsize = \"8x8\"\nexposure = -1.5e1\nfloat = true\n\
+                            seed = 0x10\ncomments = 1979-05-27\n";
         let options = Options::new(&Cli::command());
         let check = |text: &str| {
             if let Err(error) = parse(&options, Trust::Project, text) {

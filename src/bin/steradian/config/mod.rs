@@ -78,9 +78,12 @@ pub fn parse() -> Result<Parsed> {
     let given = |key: &str| options.find(key).is_some_and(|arg| is_given(render, &matches, arg));
     // --verbose on the command line overrides `quiet` in a file.
     let opposed = |key: &str| (key == "quiet" && given("verbose")) || (key == "verbose" && given("quiet"));
-    let added: Vec<Setting> = settings.into_iter().filter(|setting| !given(&setting.key) && !opposed(&setting.key)).collect();
-    let command =
-        added.iter().filter(|setting| !setting.values.is_empty()).fold(command, |command, setting| options.with_default(command, setting));
+    let added: Vec<Setting> =
+        settings.into_iter().filter(|setting| !given(&setting.key) && !opposed(&setting.key)).collect();
+    let command = added
+        .iter()
+        .filter(|setting| !setting.values.is_empty())
+        .fold(command, |command, setting| options.with_default(command, setting));
     let matches = command.try_get_matches_from(&line).unwrap_or_else(|error| exit(&error));
     Ok(Parsed { cli: typed(&matches), warnings, added, files })
 }
@@ -137,7 +140,8 @@ pub struct Options {
 impl Options {
     /// Those that the command line's definition has.
     pub fn new(command: &Command) -> Self {
-        let known = |arg: &&Arg| arg.get_long().is_some_and(|long| trust(long).is_some_and(|trust| trust < Trust::CommandLine));
+        let known =
+            |arg: &&Arg| arg.get_long().is_some_and(|long| trust(long).is_some_and(|trust| trust < Trust::CommandLine));
         let of = |command: &Command| command.get_arguments().filter(known).cloned().collect::<Vec<_>>();
         Self { render: command.find_subcommand("render").map(of).unwrap_or_default(), global: of(command) }
     }
@@ -160,7 +164,11 @@ impl Options {
     /// A hint for a name that is not known.
     fn unknown(&self, key: &str) -> String {
         let hint = did_you_mean(key, self.names(), ["\"", "\""]);
-        let why = if trust(key) == Some(Trust::CommandLine) { "belongs to the command line" } else { "is no option of render" };
+        let why = if trust(key) == Some(Trust::CommandLine) {
+            "belongs to the command line"
+        } else {
+            "is no option of render"
+        };
         format!("\"{key}\" {why}{hint}")
     }
 
@@ -185,10 +193,13 @@ impl Options {
         if arg.get_action().takes_values() {
             let line = ["steradian".to_owned(), "render".to_owned(), "scene".to_owned()].into_iter();
             let line = line.chain(values.iter().map(|value| format!("--{key}={value}")));
-            use clap::error::ErrorKind::{InvalidValue, NoEquals, TooFewValues, TooManyValues, ValueValidation, WrongNumberOfValues};
+            use clap::error::ErrorKind::{
+                InvalidValue, NoEquals, TooFewValues, TooManyValues, ValueValidation, WrongNumberOfValues,
+            };
             match Cli::command().try_get_matches_from(line) {
                 Err(e)
-                    if [InvalidValue, NoEquals, TooFewValues, TooManyValues, ValueValidation, WrongNumberOfValues].contains(&e.kind()) =>
+                    if [InvalidValue, NoEquals, TooFewValues, TooManyValues, ValueValidation, WrongNumberOfValues]
+                        .contains(&e.kind()) =>
                 {
                     let text = e.to_string();
                     return Err(text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned());
@@ -241,7 +252,8 @@ pub fn settings(options: &Options, scene: &Path) -> Result<Found> {
             Err(warning) => warnings.push(warning),
         }
     }
-    let limits = |name: &str| std::env::var(name).is_ok_and(|value| value.parse::<usize>().is_ok_and(|threads| threads > 0));
+    let limits =
+        |name: &str| std::env::var(name).is_ok_and(|value| value.parse::<usize>().is_ok_and(|threads| threads > 0));
     if let Some(name) = FARM_THREADS.iter().find(|name| limits(name)) {
         let values = std::env::var(name).into_iter().collect();
         found.push(Setting { key: "threads".to_owned(), values, origin: Origin::Environment((*name).to_owned()) });
@@ -304,8 +316,16 @@ mod tests {
             ("HOME", "/"),
         ]);
         let found: Vec<_> = found.unwrap().into_iter().map(|s| (s.key, s.values)).collect();
-        let expected = [("target-error", vec!["0.1"]), ("float", vec!["true"]), ("overwrite", vec![]), ("output", vec!["a.exr", "b.png"])];
-        assert_eq!(found, expected.map(|(key, values)| (key.to_owned(), values.into_iter().map(str::to_owned).collect::<Vec<_>>())));
+        let expected = [
+            ("target-error", vec!["0.1"]),
+            ("float", vec!["true"]),
+            ("overwrite", vec![]),
+            ("output", vec!["a.exr", "b.png"]),
+        ];
+        assert_eq!(
+            found,
+            expected.map(|(key, values)| (key.to_owned(), values.into_iter().map(str::to_owned).collect::<Vec<_>>()))
+        );
         assert!(warnings.is_empty());
     }
 
@@ -316,7 +336,10 @@ mod tests {
         assert!(message.starts_with("STERADIAN_SPP: invalid value 'many' for '--spp <N>'"), "{message}");
         let (found, warnings) = from_environment(&[("STERADIAN_THREAD", "2"), ("STERADIAN_PIXEL", "1,2")]);
         assert!(found.unwrap().is_empty());
-        assert!(warnings[0].contains("did you mean \"threads\"") && warnings[1].contains("belongs to the command line"), "{warnings:?}");
+        assert!(
+            warnings[0].contains("did you mean \"threads\"") && warnings[1].contains("belongs to the command line"),
+            "{warnings:?}"
+        );
     }
 
     #[test]

@@ -75,7 +75,8 @@ pub fn run(arguments: &ConfigShowArgs) -> Result<()> {
 
 /// The scene's values, and the defaults of those it does not have.
 fn scene_rows(scene: Option<&Path>) -> Result<Vec<SettingRow>> {
-    let as_json = |desc: &steradian::desc::SceneDesc| serde_json::to_value(desc).map_err(|e| Error::Internal(e.to_string()));
+    let as_json =
+        |desc: &steradian::desc::SceneDesc| serde_json::to_value(desc).map_err(|e| Error::Internal(e.to_string()));
     let bare = as_json(&import::parse_scene(r#"{ "camera": {} }"#, Path::new("scene.json"))?)?;
     let (desc, written) = match scene {
         None => (bare.clone(), None),
@@ -86,7 +87,8 @@ fn scene_rows(scene: Option<&Path>) -> Result<Vec<SettingRow>> {
     };
     let mut rows = Vec::new();
     for (key, places) in IN_SCENES {
-        let values: Vec<&Value> = places.iter().filter_map(|place| desc.pointer(place)).filter(|value| !value.is_null()).collect();
+        let values: Vec<&Value> =
+            places.iter().filter_map(|place| desc.pointer(place)).filter(|value| !value.is_null()).collect();
         if values.len() < places.len() || values.iter().any(|value| value.as_array().is_some_and(Vec::is_empty)) {
             continue;
         }
@@ -101,7 +103,11 @@ fn scene_rows(scene: Option<&Path>) -> Result<Vec<SettingRow>> {
             _ => "built-in".to_owned(),
         };
         let separator = if key == "size" { "x" } else { "," };
-        rows.push(SettingRow { key: key.to_owned(), value: values.into_iter().map(word).collect::<Vec<_>>().join(separator), origin });
+        rows.push(SettingRow {
+            key: key.to_owned(),
+            value: values.into_iter().map(word).collect::<Vec<_>>().join(separator),
+            origin,
+        });
     }
     Ok(rows)
 }

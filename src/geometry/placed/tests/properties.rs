@@ -12,7 +12,8 @@ fn vase() -> Profile {
 }
 
 fn shapes() -> Vec<Analytic> {
-    let mut shapes = vec![Analytic::Quad(Quad::new(dvec3(0.3, -0.2, 0.1), dvec3(1.5, 0.2, 0.3), dvec3(-0.1, 0.8, 0.4)).unwrap())];
+    let mut shapes =
+        vec![Analytic::Quad(Quad::new(dvec3(0.3, -0.2, 0.1), dvec3(1.5, 0.2, 0.3), dvec3(-0.1, 0.8, 0.4)).unwrap())];
     for phi_max in [1.0, 3.5, TAU] {
         shapes.push(Analytic::Sphere(Sphere::new(1.5, -1.5, 1.5, phi_max).unwrap()));
         shapes.push(Analytic::Sphere(Sphere::new(1.5, -0.6, 1.2, phi_max).unwrap()));
@@ -22,7 +23,9 @@ fn shapes() -> Vec<Analytic> {
         shapes.push(Analytic::Frustum(Frustum::new(0.8, 0.0, 1.7, phi_max).unwrap()));
         shapes.push(Analytic::Frustum(Frustum::new(0.3, 1.1, 0.4, phi_max).unwrap()));
         for parameter in [ProfileParameter::Curve, ProfileParameter::Height, ProfileParameter::ArcLength] {
-            shapes.push(Analytic::Revolution(Revolution::new(&vase(), phi_max).unwrap().with_parameter(parameter).unwrap()));
+            shapes.push(Analytic::Revolution(
+                Revolution::new(&vase(), phi_max).unwrap().with_parameter(parameter).unwrap(),
+            ));
         }
     }
     shapes
@@ -64,7 +67,10 @@ fn samples_are_hit_where_they_are_with_the_same_density() {
         for _ in 0..2_000 {
             let sample = shape.sample([random.range(0.001, 0.999), random.range(0.001, 0.999)]);
             let s = hit_from_above(&shape, sample.p, sample.n).unwrap_or_else(|| panic!("{shape:?} {sample:?}"));
-            assert!((s.p - sample.p).length() < 1e-12 && (s.n - sample.n).length() < 1e-8, "{shape:?} {s:?} {sample:?}");
+            assert!(
+                (s.p - sample.p).length() < 1e-12 && (s.n - sample.n).length() < 1e-8,
+                "{shape:?} {s:?} {sample:?}"
+            );
             assert!((s.pdf_area - sample.pdf_area).abs() < 1e-7 * sample.pdf_area, "{shape:?} {s:?} {sample:?}");
             assert!(s.uv.iter().all(|x| (0.0..=1.0).contains(x)), "{s:?}");
         }
@@ -213,7 +219,8 @@ fn placed_densities_integrate_to_one() {
             let placed = TransformedShape::new(shape.clone(), transform);
             let mid = |i: usize| (i as f32 + 0.5) / SIDE as f32;
             let (mut from_pdf, mut from_patches) = (0.0, 0.0);
-            let corner = |i: usize, k: usize| transform.point(shape.sample([i as f64 / SIDE as f64, k as f64 / SIDE as f64]).p);
+            let corner =
+                |i: usize, k: usize| transform.point(shape.sample([i as f64 / SIDE as f64, k as f64 / SIDE as f64]).p);
             for i in 0..SIDE {
                 for k in 0..SIDE {
                     from_pdf += 1.0 / placed.sample_area([mid(i), mid(k)]).pdf_area / (SIDE * SIDE) as f64;
@@ -257,7 +264,14 @@ fn points_resolved_in_rows_are_those_of_single_hits() {
                 let Some(hit) = placed.intersect(&ray) else { continue };
                 rays.set(found.len(), &ray);
                 t[found.len()] = hit.t as f32;
-                found.push(Hit { t: hit.t as f32, u: 0.0, v: 0.0, shape: ShapeId(0), prim: PrimId(0), instance: Hit::NO_INSTANCE });
+                found.push(Hit {
+                    t: hit.t as f32,
+                    u: 0.0,
+                    v: 0.0,
+                    shape: ShapeId(0),
+                    prim: PrimId(0),
+                    instance: Hit::NO_INSTANCE,
+                });
             }
             let (mut points, mut normals) = (WorldPointRows::default(), WorldNormalRows::default());
             placed.resolve_rows(&rays, &t, count, &mut points, &mut normals);
@@ -284,17 +298,23 @@ fn packets_hit_what_single_rays_hit() {
     for shape in shapes() {
         for scale in [1.0, 1e-3] {
             let matrix = DMat3::from_cols(dvec3(0.6, 0.8, 0.1), dvec3(-0.8, 0.5, 0.0), dvec3(0.1, 0.2, 1.3)) * scale;
-            let transform = Transform::new(DAffine3 { matrix3: matrix, translation: dvec3(0.3, -2.0, 1.0) * scale }).unwrap();
+            let transform =
+                Transform::new(DAffine3 { matrix3: matrix, translation: dvec3(0.3, -2.0, 1.0) * scale }).unwrap();
             let placed = TransformedShape::new(shape.clone(), transform);
             for round in 0..40 {
-                let mut vector =
-                    |size: f64| dvec3(random.range(-size, size), random.range(-size, size), random.range(-size, size)).as_vec3();
+                let mut vector = |size: f64| {
+                    dvec3(random.range(-size, size), random.range(-size, size), random.range(-size, size)).as_vec3()
+                };
                 let rays: [Ray; PACKET_SIZE] = std::array::from_fn(|i| {
                     let origin = vector(3.0 * scale) + transform.point(DVec3::ZERO).as_vec3();
                     let t_max = if i % 5 == 4 { 1.0 } else { f32::INFINITY };
-                    let ray = Ray { t_max, ..Ray::new(origin, transform.point(DVec3::ZERO).as_vec3() - origin + vector(scale)) };
+                    let ray = Ray {
+                        t_max,
+                        ..Ray::new(origin, transform.point(DVec3::ZERO).as_vec3() - origin + vector(scale))
+                    };
                     // On, or steps past, what it has met: the start of the interval decides.
-                    let t_min = if round % 4 == 3 { placed.intersect(&ray).map_or(0.0, |hit| hit.t as f32) } else { 0.0 };
+                    let t_min =
+                        if round % 4 == 3 { placed.intersect(&ray).map_or(0.0, |hit| hit.t as f32) } else { 0.0 };
                     Ray { t_min, ..ray }
                 });
                 let row = |of: fn(&Ray) -> f32| rays.each_ref().map(of);

@@ -92,12 +92,23 @@ pub enum AccessorUse {
 
 impl<'a> GltfSource<'a> {
     /// The elements of an accessor that `path` names, which must be of one of these types.
-    pub fn column(&self, path: &str, index: Index<accessor::Accessor>, types: &[Type], accessor_use: AccessorUse) -> Result<Column<'a>> {
+    pub fn column(
+        &self,
+        path: &str,
+        index: Index<accessor::Accessor>,
+        types: &[Type],
+        accessor_use: AccessorUse,
+    ) -> Result<Column<'a>> {
         let place = format!("{path} (accessors[{}])", index.value());
         self.checked_column(index, types, accessor_use).map_err(|message| self.fault(&place, message))
     }
 
-    fn checked_column(&self, index: Index<accessor::Accessor>, types: &[Type], accessor_use: AccessorUse) -> Result<Column<'a>, String> {
+    fn checked_column(
+        &self,
+        index: Index<accessor::Accessor>,
+        types: &[Type],
+        accessor_use: AccessorUse,
+    ) -> Result<Column<'a>, String> {
         let accessor = self.root.get(index).ok_or("there is no such accessor")?;
         let (Checked::Valid(kind), Checked::Valid(type_)) = (accessor.component_type, accessor.type_) else {
             return Err("the type is not one of glTF".into());
@@ -110,7 +121,9 @@ impl<'a> GltfSource<'a> {
                 types.iter().map(|t| name(*t)).collect::<Vec<_>>().join(" or ")
             ));
         }
-        if accessor_use == AccessorUse::Indices && !matches!(kind, ComponentType::U8 | ComponentType::U16 | ComponentType::U32) {
+        if accessor_use == AccessorUse::Indices
+            && !matches!(kind, ComponentType::U8 | ComponentType::U16 | ComponentType::U32)
+        {
             return Err("has numbers that are no indices".into());
         }
         let (width, size) = (type_.multiplicity(), kind.size());
@@ -119,8 +132,15 @@ impl<'a> GltfSource<'a> {
         }
         let count = usize::try_from(accessor.count.0).map_err(|_| "has too many elements")?;
         let element = width * size;
-        let mut column =
-            Column { bytes: None, stride: element, count, kind, normalized: accessor.normalized, sparse: BTreeMap::new(), width };
+        let mut column = Column {
+            bytes: None,
+            stride: element,
+            count,
+            kind,
+            normalized: accessor.normalized,
+            sparse: BTreeMap::new(),
+            width,
+        };
         if let Some(view) = accessor.buffer_view {
             let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
             (column.bytes, column.stride) = self.elements(view.value(), offset, count, element)?;
@@ -134,7 +154,13 @@ impl<'a> GltfSource<'a> {
     }
 
     /// The bytes of elements in a view from the first on, and from one to the next.
-    fn elements(&self, view: usize, offset: u64, count: usize, size: usize) -> Result<(Option<&'a [u8]>, usize), String> {
+    fn elements(
+        &self,
+        view: usize,
+        offset: u64,
+        count: usize,
+        size: usize,
+    ) -> Result<(Option<&'a [u8]>, usize), String> {
         let json = self.root.buffer_views.get(view).ok_or("there is no such view")?;
         let view_of = self.buffers.view(json).map_err(|message| format!("bufferViews[{view}]: {message}"))?;
         let stride = view_of.stride.unwrap_or(size);
@@ -144,12 +170,20 @@ impl<'a> GltfSource<'a> {
         let last = (count as u64).saturating_sub(1).checked_mul(stride as u64);
         let end = last.and_then(|last| last.checked_add(offset)?.checked_add(if count > 0 { size as u64 } else { 0 }));
         if end.is_none_or(|end| end > view_of.bytes.len() as u64) {
-            return Err(format!("{count} elements do not fit into bufferViews[{view}], which has {} bytes", view_of.bytes.len()));
+            return Err(format!(
+                "{count} elements do not fit into bufferViews[{view}], which has {} bytes",
+                view_of.bytes.len()
+            ));
         }
         Ok((view_of.bytes.get(offset as usize..), stride))
     }
 
-    fn sparse(&self, sparse: &accessor::sparse::Sparse, count: usize, element: usize) -> Result<BTreeMap<usize, &'a [u8]>, String> {
+    fn sparse(
+        &self,
+        sparse: &accessor::sparse::Sparse,
+        count: usize,
+        element: usize,
+    ) -> Result<BTreeMap<usize, &'a [u8]>, String> {
         let replaced = usize::try_from(sparse.count.0).unwrap_or(usize::MAX);
         if replaced > count {
             return Err(format!("replaces {replaced} of {count} elements"));
@@ -158,8 +192,10 @@ impl<'a> GltfSource<'a> {
             return Err("the type of its sparse indices is not one of glTF".into());
         };
         let size = kind.0.size();
-        let (indices, index_stride) = self.elements(sparse.indices.buffer_view.value(), sparse.indices.byte_offset.0, replaced, size)?;
-        let (values, stride) = self.elements(sparse.values.buffer_view.value(), sparse.values.byte_offset.0, replaced, element)?;
+        let (indices, index_stride) =
+            self.elements(sparse.indices.buffer_view.value(), sparse.indices.byte_offset.0, replaced, size)?;
+        let (values, stride) =
+            self.elements(sparse.values.buffer_view.value(), sparse.values.byte_offset.0, replaced, element)?;
         let (indices, values) = (indices.unwrap_or_default(), values.unwrap_or_default());
         let mut map = BTreeMap::new();
         for i in 0..replaced {

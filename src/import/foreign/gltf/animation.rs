@@ -38,7 +38,8 @@ pub fn evaluate(source: GltfSource, time: f64, draft: &mut Draft) -> Result<Moti
                 continue;
             }
             let sampler = animation.samplers.get(channel.sampler.value());
-            let sampler = sampler.ok_or_else(|| source.fault(&format!("{path}.sampler"), "there is no such sampler"))?;
+            let sampler =
+                sampler.ok_or_else(|| source.fault(&format!("{path}.sampler"), "there is no such sampler"))?;
             let curve = Curve::new(source, &path, sampler, value_type(property))?;
             motion.set(node, property, &curve, time).ok_or_else(|| source.fault(&path, "does not give a rotation"))?;
             draft.mapped(&path, &element, "channel");
@@ -60,7 +61,8 @@ impl Motion {
     /// Sets a property of a node to its value at a time; `None` if that is no rotation.
     fn set(&mut self, node: usize, property: Property, curve: &Curve, time: f64) -> Option<()> {
         let at = curve.moment(time);
-        let vector = |at: &Moment| DVec3::from_array(curve.blend(at, 0, |column, i| column.floats::<3>(i).map(f64::from)));
+        let vector =
+            |at: &Moment| DVec3::from_array(curve.blend(at, 0, |column, i| column.floats::<3>(i).map(f64::from)));
         match property {
             Property::Translation => {
                 self.translations.insert(node, vector(&at));
@@ -73,7 +75,8 @@ impl Motion {
             }
             Property::MorphTargetWeights => {
                 let width = curve.values.count() / curve.slots().max(1);
-                let weights = (0..width).map(|k| curve.blend(&at, k, |column, i| column.floats::<1>(i).map(f64::from))[0] as f32);
+                let weights =
+                    (0..width).map(|k| curve.blend(&at, k, |column, i| column.floats::<1>(i).map(f64::from))[0] as f32);
                 self.weights.insert(node, weights.collect());
             }
         }
@@ -119,7 +122,8 @@ impl<'a> Curve<'a> {
         for i in 0..curve.times.count() {
             let time = curve.time(i);
             if !(time > last && time.is_finite()) {
-                return Err(source.fault(path, format!("time {i} of {} does not come after the one before", curve.times.count())));
+                return Err(source
+                    .fault(path, format!("time {i} of {} does not come after the one before", curve.times.count())));
             }
             last = time;
         }

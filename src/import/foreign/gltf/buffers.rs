@@ -73,11 +73,17 @@ impl<'a> Buffers<'a> {
     /// A view, or why there is none.
     pub fn view(&self, view: &buffer::View) -> Result<View<'_>, String> {
         let buffer = view.buffer.value();
-        let bytes = self.list.get(buffer).and_then(Bytes::get).ok_or_else(|| format!("buffers[{buffer}] has no data"))?;
+        let bytes =
+            self.list.get(buffer).and_then(Bytes::get).ok_or_else(|| format!("buffers[{buffer}] has no data"))?;
         let (start, length) = (view.byte_offset.map_or(0, |offset| offset.0), view.byte_length.0);
-        let range = usize::try_from(start).ok().zip(start.checked_add(length).and_then(|end| usize::try_from(end).ok()));
+        let range =
+            usize::try_from(start).ok().zip(start.checked_add(length).and_then(|end| usize::try_from(end).ok()));
         let bytes = range.and_then(|(start, end)| bytes.get(start..end)).ok_or_else(|| {
-            format!("bytes {start} to {} are not all in buffers[{buffer}], which has {}", start.saturating_add(length), bytes.len())
+            format!(
+                "bytes {start} to {} are not all in buffers[{buffer}], which has {}",
+                start.saturating_add(length),
+                bytes.len()
+            )
         })?;
         Ok(View { bytes, stride: view.byte_stride.map(|stride| stride.0) })
     }
@@ -95,7 +101,8 @@ impl Bytes<'_> {
 
 /// Reads a file.
 fn read_file(path: &Path, named_by: &str) -> Result<Vec<u8>> {
-    let missing = |message: String| Error::Missing { file: path.into(), message: format!("{message} (named by {named_by})") };
+    let missing =
+        |message: String| Error::Missing { file: path.into(), message: format!("{message} (named by {named_by})") };
     crate::file::read(path).map_err(|e| missing(e.to_string()))
 }
 
@@ -181,8 +188,13 @@ mod tests {
     fn uris_are_files_or_data() {
         assert_eq!(Uri::parse("a%20b/%C3%A4.bin"), Ok(Uri::File("a b/ä.bin".into())));
         assert_eq!(Uri::parse("50%.bin"), Ok(Uri::File("50%.bin".into())));
-        for (text, bytes) in [("", &b""[..]), ("TQ==", b"M"), ("TWE", b"Ma"), ("TWFu", b"Man"), ("+/8A", &[0xfb, 0xff, 0])] {
-            assert_eq!(Uri::parse(&format!("data:application/octet-stream;base64,{text}")), Ok(Uri::Data(bytes.into())));
+        for (text, bytes) in
+            [("", &b""[..]), ("TQ==", b"M"), ("TWE", b"Ma"), ("TWFu", b"Man"), ("+/8A", &[0xfb, 0xff, 0])]
+        {
+            assert_eq!(
+                Uri::parse(&format!("data:application/octet-stream;base64,{text}")),
+                Ok(Uri::Data(bytes.into()))
+            );
         }
         assert_eq!(Uri::parse("data:,a%00"), Ok(Uri::Data(vec![b'a', 0])));
         for bad in ["data:base64", "data:;base64,T", "data:;base64,T*==", "https://a/b.bin", "", "%ff"] {

@@ -20,7 +20,9 @@ pub fn add(source: GltfSource, tree: &Tree, pose: &Pose, draft: &mut Draft) -> R
     (draft.desc.film.width, draft.desc.film.height) = (WIDTH, HEIGHT);
     let mut found = false;
     for &i in &tree.shown {
-        let Some((node, index)) = source.root.nodes.get(i).and_then(|node| Some((node, node.camera?))) else { continue };
+        let Some((node, index)) = source.root.nodes.get(i).and_then(|node| Some((node, node.camera?))) else {
+            continue;
+        };
         let path = format!("nodes[{i}]");
         if found {
             draft.ignored(&path, &label(node, i), "camera", "the first camera of the scene is used");
@@ -49,7 +51,10 @@ fn lens(source: GltfSource, place: &str, camera: &Camera, draft: &mut Draft) -> 
     let (near, aspect) = match (camera.type_, &camera.perspective, &camera.orthographic) {
         (Checked::Valid(Type::Orthographic), _, Some(lens)) => {
             // A mirrored picture has no camera here; the sign of a magnitude is dropped.
-            let [x, y] = [within("orthographic.xmag", lens.xmag.abs(), f64::MAX)?, within("orthographic.ymag", lens.ymag.abs(), f64::MAX)?];
+            let [x, y] = [
+                within("orthographic.xmag", lens.xmag.abs(), f64::MAX)?,
+                within("orthographic.ymag", lens.ymag.abs(), f64::MAX)?,
+            ];
             desc.kind = CameraKindDesc::Orthographic;
             desc.view_height = Some(2.0 * y);
             draft.mapped(place, "camera", "orthographic");
@@ -58,7 +63,10 @@ fn lens(source: GltfSource, place: &str, camera: &Camera, draft: &mut Draft) -> 
         (_, Some(lens), _) => {
             desc.vertical_fov_degrees = Some(within("perspective.yfov", lens.yfov, std::f64::consts::PI)?.to_degrees());
             draft.mapped(place, "camera", "perspective");
-            (lens.znear, lens.aspect_ratio.map(|aspect| within("perspective.aspectRatio", aspect, f64::MAX)).transpose()?)
+            (
+                lens.znear,
+                lens.aspect_ratio.map(|aspect| within("perspective.aspectRatio", aspect, f64::MAX)).transpose()?,
+            )
         }
         _ => return Err(source.fault(place, "has no lens of its type")),
     };

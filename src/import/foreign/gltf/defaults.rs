@@ -18,7 +18,8 @@ pub fn add_camera(placed: &Placed, draft: &mut Draft) {
     draft.approximated("nodes", "file", "camera", how);
     let alone = [DVec3::NEG_ONE, DVec3::ONE];
     let corners = if placed.corners.is_empty() { &alone[..] } else { &placed.corners };
-    let [min, max] = corners.iter().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[min, max], p| [min.min(*p), max.max(*p)]);
+    let [min, max] =
+        corners.iter().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[min, max], p| [min.min(*p), max.max(*p)]);
     let middle = 0.5 * (min + max);
     let backward = BACKWARD.normalize();
     let right = DVec3::Y.cross(backward).normalize();
@@ -45,7 +46,12 @@ pub fn add_camera(placed: &Placed, draft: &mut Draft) {
 
 /// Adds a sky and a sun from the upper left.
 pub fn add_light(draft: &mut Draft) {
-    draft.approximated("nodes", "file", "lights", "the file has no light: a pale sky and a sun from the upper left light the scene");
+    draft.approximated(
+        "nodes",
+        "file",
+        "lights",
+        "the file has no light: a pale sky and a sun from the upper left light the scene",
+    );
     let file = draft.keep_environment("sky", sky());
     let place = "the file has no light";
     let sky = EnvironmentLightDesc { radiance: None, file: Some(file), scale: 1.0, transform: None, group: None };

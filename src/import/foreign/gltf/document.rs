@@ -56,7 +56,8 @@ const NO_ELEMENT: &str = "there is no element of this index";
 /// Splits and parses the bytes of a file.
 pub fn parse<'a>(file: &Path, bytes: &'a [u8]) -> Result<Document<'a>> {
     let fault = |path: &str, message: String| Error::Scene { file: file.into(), path: path.into(), message };
-    let (json, bin) = if bytes.starts_with(b"glTF") { split(bytes).map_err(|message| fault("GLB", message))? } else { (bytes, None) };
+    let (json, bin) =
+        if bytes.starts_with(b"glTF") { split(bytes).map_err(|message| fault("GLB", message))? } else { (bytes, None) };
     let json = json.strip_prefix(crate::file::MARK).unwrap_or(json);
     let misread = |e: serde_json::Error| {
         let text = e.to_string();
@@ -76,7 +77,10 @@ pub fn parse<'a>(file: &Path, bytes: &'a [u8]) -> Result<Document<'a>> {
     }
     let unread: Vec<&str> = head.required.iter().map(String::as_str).filter(|name| !READ.contains(name)).collect();
     if !unread.is_empty() {
-        return Err(fault("extensionsRequired", format!("the file cannot be read without {}, which is not supported", unread.join(", "))));
+        return Err(fault(
+            "extensionsRequired",
+            format!("the file cannot be read without {}, which is not supported", unread.join(", ")),
+        ));
     }
 
     let root: Root = serde_json::from_slice(json).map_err(misread)?;
@@ -153,7 +157,12 @@ pub fn report_extensions(root: &Root, draft: &mut Draft) {
         if READ.contains(&name.as_str()) {
             draft.mapped("extensionsUsed", &format!("extension {name}"), "");
         } else {
-            draft.ignored("extensionsUsed", &format!("extension {name}"), "", "unsupported; the rest of the file is read without it");
+            draft.ignored(
+                "extensionsUsed",
+                &format!("extension {name}"),
+                "",
+                "unsupported; the rest of the file is read without it",
+            );
         }
     }
 }

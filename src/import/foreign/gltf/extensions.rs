@@ -10,9 +10,15 @@ use crate::error::Result;
 
 impl GltfSource<'_> {
     /// The extension `name` of the object at `path`, if it has it.
-    pub fn extension<T: DeserializeOwned>(&self, path: &str, extensions: Option<&Map<String, Value>>, name: &str) -> Result<Option<T>> {
+    pub fn extension<T: DeserializeOwned>(
+        &self,
+        path: &str,
+        extensions: Option<&Map<String, Value>>,
+        name: &str,
+    ) -> Result<Option<T>> {
         let Some(value) = extensions.and_then(|extensions| extensions.get(name)) else { return Ok(None) };
-        let read = T::deserialize(value).map_err(|e| self.fault(&format!("{path}.extensions.{name}"), e.to_string()))?;
+        let read =
+            T::deserialize(value).map_err(|e| self.fault(&format!("{path}.extensions.{name}"), e.to_string()))?;
         Ok(Some(read))
     }
 }

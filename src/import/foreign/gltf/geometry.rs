@@ -54,11 +54,17 @@ pub fn attribute(primitive: &Primitive, semantic: Semantic) -> Option<Index<acce
 }
 
 /// Reads the triangles of a primitive; `None` if there are none.
-pub fn triangles(source: GltfSource, path: &str, primitive: &Primitive, deformation: Deformation) -> Result<Option<Triangles>> {
+pub fn triangles(
+    source: GltfSource,
+    path: &str,
+    primitive: &Primitive,
+    deformation: Deformation,
+) -> Result<Option<Triangles>> {
     let Some(positions) = attribute(primitive, Semantic::Positions) else {
         return Err(source.fault(path, "has no positions"));
     };
-    let positions = source.column(&format!("{path}.attributes.POSITION"), positions, &[Type::Vec3], AccessorUse::Floats)?;
+    let positions =
+        source.column(&format!("{path}.attributes.POSITION"), positions, &[Type::Vec3], AccessorUse::Floats)?;
     let count = positions.count();
     let Checked::Valid(mode) = primitive.mode else {
         return Err(source.fault(&format!("{path}.mode"), "is not one of glTF"));
@@ -97,7 +103,8 @@ impl Triangles {
         let reader = PrimitiveReader { source, path, primitive, count: self.count };
         let uvs = reader.column(&name, Semantic::TexCoords(set), &[Type::Vec2], AccessorUse::Floats)?;
         // Their origin is the upper left corner; Steradian's is the lower left one.
-        let flipped = |uvs: Column| self.used.iter().map(|&i| uvs.floats::<2>(i as usize)).map(|[u, v]| [u, 1.0 - v]).collect();
+        let flipped =
+            |uvs: Column| self.used.iter().map(|&i| uvs.floats::<2>(i as usize)).map(|[u, v]| [u, 1.0 - v]).collect();
         self.data.uvs = uvs.map(flipped);
         Ok(())
     }
@@ -113,13 +120,21 @@ struct PrimitiveReader<'a, 'p> {
 
 impl<'a> PrimitiveReader<'a, '_> {
     /// An attribute that has an element for each vertex, if the primitive has it.
-    fn column(&self, name: &str, semantic: Semantic, types: &[Type], accessor_use: AccessorUse) -> Result<Option<Column<'a>>> {
+    fn column(
+        &self,
+        name: &str,
+        semantic: Semantic,
+        types: &[Type],
+        accessor_use: AccessorUse,
+    ) -> Result<Option<Column<'a>>> {
         let Self { source, path, primitive, count } = *self;
         let Some(index) = attribute(primitive, semantic) else { return Ok(None) };
         let place = format!("{path}.attributes.{name}");
         let column = source.column(&place, index, types, accessor_use)?;
         if column.count() != count {
-            return Err(source.fault(&place, format!("has {} elements, but there are {count} positions", column.count())));
+            return Err(
+                source.fault(&place, format!("has {} elements, but there are {count} positions", column.count()))
+            );
         }
         Ok(Some(column))
     }
@@ -129,13 +144,16 @@ impl<'a> PrimitiveReader<'a, '_> {
         let Self { source, path, primitive, count } = *self;
         let path = format!("{path}.indices");
         let Some(index) = primitive.indices else {
-            let count = u32::try_from(count).map_err(|_| source.fault(&path, "more vertices than 32-bit numbers can name"))?;
+            let count =
+                u32::try_from(count).map_err(|_| source.fault(&path, "more vertices than 32-bit numbers can name"))?;
             return Ok((0..count).collect());
         };
         let indices = source.column(&path, index, &[Type::Scalar], AccessorUse::Indices)?;
         let corners: Vec<u32> = (0..indices.count()).map(|i| indices.indices::<1>(i)[0]).collect();
         match corners.iter().position(|&i| i as usize >= count) {
-            Some(at) => Err(source.fault(&path, format!("index {at} is {}, but there are {count} vertices", corners[at]))),
+            Some(at) => {
+                Err(source.fault(&path, format!("index {at} is {}, but there are {count} vertices", corners[at])))
+            }
             None => Ok(corners),
         }
     }
@@ -148,14 +166,16 @@ impl<'a> PrimitiveReader<'a, '_> {
             if weight == 0.0 {
                 continue;
             }
-            for (name, index, moved) in
-                [("POSITION", target.positions, Some(&mut data.positions)), ("NORMAL", target.normals, data.normals.as_mut())]
-            {
+            for (name, index, moved) in [
+                ("POSITION", target.positions, Some(&mut data.positions)),
+                ("NORMAL", target.normals, data.normals.as_mut()),
+            ] {
                 let (Some(index), Some(moved)) = (index, moved) else { continue };
                 let place = format!("{path}.targets[{t}].{name}");
                 let steps = source.column(&place, index, &[Type::Vec3], AccessorUse::Floats)?;
                 if steps.count() != count {
-                    return Err(source.fault(&place, format!("has {} elements, but there are {count} positions", steps.count())));
+                    return Err(source
+                        .fault(&place, format!("has {} elements, but there are {count} positions", steps.count())));
                 }
                 for (value, &i) in moved.iter_mut().zip(used) {
                     let step = steps.floats::<3>(i as usize);
@@ -174,8 +194,10 @@ impl<'a> PrimitiveReader<'a, '_> {
             if attribute(primitive, Semantic::Joints(set)).is_none() {
                 break;
             }
-            let indices = self.column(&format!("JOINTS_{set}"), Semantic::Joints(set), &[Type::Vec4], AccessorUse::Indices)?;
-            let weights = self.column(&format!("WEIGHTS_{set}"), Semantic::Weights(set), &[Type::Vec4], AccessorUse::Floats)?;
+            let indices =
+                self.column(&format!("JOINTS_{set}"), Semantic::Joints(set), &[Type::Vec4], AccessorUse::Indices)?;
+            let weights =
+                self.column(&format!("WEIGHTS_{set}"), Semantic::Weights(set), &[Type::Vec4], AccessorUse::Floats)?;
             let (Some(indices), Some(weights)) = (indices, weights) else {
                 return Err(source.fault(path, format!("has JOINTS_{set}, but not WEIGHTS_{set}")));
             };
@@ -183,8 +205,11 @@ impl<'a> PrimitiveReader<'a, '_> {
         }
         for (v, &i) in used.iter().enumerate() {
             let i = i as usize;
-            let carried = sets.iter().flat_map(|(indices, weights)| indices.indices::<4>(i).into_iter().zip(weights.floats::<4>(i)));
-            let carried: Vec<(usize, f64)> = carried.map(|(joint, weight)| (joint as usize, f64::from(weight))).collect();
+            let carried = sets
+                .iter()
+                .flat_map(|(indices, weights)| indices.indices::<4>(i).into_iter().zip(weights.floats::<4>(i)));
+            let carried: Vec<(usize, f64)> =
+                carried.map(|(joint, weight)| (joint as usize, f64::from(weight))).collect();
             if let Some((joint, _)) = carried.iter().find(|(joint, weight)| *weight > 0.0 && *joint >= joints.len()) {
                 return Err(source.fault(path, format!("vertex {i} hangs on joint {joint} of {}", joints.len())));
             }
@@ -211,9 +236,11 @@ fn assemble(mode: Mode, corners: &[u32]) -> Vec<[u32; 3]> {
     match mode {
         Mode::Triangles => corners.as_chunks::<3>().0.to_vec(),
         // Every other triangle of a strip is wound the other way round.
-        Mode::TriangleStrip => {
-            corners.windows(3).enumerate().map(|(i, w)| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] }).collect()
-        }
+        Mode::TriangleStrip => corners
+            .windows(3)
+            .enumerate()
+            .map(|(i, w)| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] })
+            .collect(),
         Mode::TriangleFan => match corners {
             [first, rest @ ..] => rest.windows(2).map(|w| [*first, w[0], w[1]]).collect(),
             [] => Vec::new(),
@@ -248,6 +275,10 @@ impl VertexColors {
             sum.iter_mut().zip(color).for_each(|(sum, c)| *sum += f64::from(*c));
         }
         let differ = |k: usize| colors.iter().any(|color| Some(color[k]) != colors.first().map(|first| first[k]));
-        Self { mean: sum.map(|sum| (sum / colors.len().max(1) as f64) as f32), differ: (0..3).any(differ), differ_in_alpha: differ(3) }
+        Self {
+            mean: sum.map(|sum| (sum / colors.len().max(1) as f64) as f32),
+            differ: (0..3).any(differ),
+            differ_in_alpha: differ(3),
+        }
     }
 }

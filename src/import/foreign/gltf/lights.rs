@@ -20,10 +20,12 @@ pub fn add(source: GltfSource, tree: &Tree, pose: &Pose, draft: &mut Draft) -> R
         let extensions = node.extensions.as_ref().map(|extensions| &extensions.others);
         let Some(index) = source.extension::<LightIndex>(&path, extensions, NAME)? else { continue };
         let light = lights.lights.get(index.light);
-        let light =
-            light.ok_or_else(|| source.fault(&format!("{path}.extensions.{NAME}"), format!("there is no light {}", index.light)))?;
+        let light = light.ok_or_else(|| {
+            source.fault(&format!("{path}.extensions.{NAME}"), format!("there is no light {}", index.light))
+        })?;
         if !found {
-            let how = "1 candela is taken for 1 W/sr, 1 lux for 1 W/m², and 1 nit of what surfaces give off for 1 W/(sr m²)";
+            let how =
+                "1 candela is taken for 1 W/sr, 1 lux for 1 W/m², and 1 nit of what surfaces give off for 1 W/(sr m²)";
             draft.approximated("extensions", NAME, "units", how);
         }
         found = true;
@@ -63,7 +65,9 @@ fn desc(source: GltfSource, path: &str, light: &Light, world: &DAffine3) -> Resu
             let spot = light.spot.clone().unwrap_or_default();
             let (inner, outer) = (spot.inner_cone_angle, spot.outer_cone_angle);
             if !(outer > 0.0 && outer <= std::f64::consts::PI && inner >= 0.0 && inner <= outer) {
-                return Err(source.fault(path, format!("a spot light cannot have cones of {inner} and {outer} radians")));
+                return Err(
+                    source.fault(path, format!("a spot light cannot have cones of {inner} and {outer} radians"))
+                );
             }
             LightDesc::Spot(SpotLightDesc {
                 position,

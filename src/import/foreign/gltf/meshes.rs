@@ -103,11 +103,19 @@ pub fn add(source: GltfSource, tree: &Tree, pose: &Pose, draft: &mut Draft) -> R
 fn form(source: GltfSource, node: usize, mesh: Index<Mesh>, pose: &Pose) -> Result<Form> {
     let (index, json) = (mesh.value(), source.root.nodes.get(node));
     let targets = |primitive: &Primitive| primitive.targets.as_ref().map_or(0, Vec::len);
-    let mesh = source.root.get(mesh).ok_or_else(|| source.fault(&format!("nodes[{node}].mesh"), "there is no such mesh"))?;
+    let mesh =
+        source.root.get(mesh).ok_or_else(|| source.fault(&format!("nodes[{node}].mesh"), "there is no such mesh"))?;
     let count = mesh.primitives.iter().map(targets).max().unwrap_or(0);
-    let given = pose.weights.get(node).and_then(Option::as_ref).or(json.and_then(|json| json.weights.as_ref())).or(mesh.weights.as_ref());
+    let given = pose
+        .weights
+        .get(node)
+        .and_then(Option::as_ref)
+        .or(json.and_then(|json| json.weights.as_ref()))
+        .or(mesh.weights.as_ref());
     if let Some(weights) = given.filter(|weights| weights.len() != count) {
-        return Err(source.fault(&format!("nodes[{node}]"), format!("has {} weights for {count} morph targets", weights.len())));
+        return Err(
+            source.fault(&format!("nodes[{node}]"), format!("has {} weights for {count} morph targets", weights.len()))
+        );
     }
     let weights = given.map(|weights| weights.iter().map(|weight| weight.to_bits()).collect()).unwrap_or_default();
     let is_skinned = json.is_some_and(|json| json.skin.is_some());
@@ -115,7 +123,13 @@ fn form(source: GltfSource, node: usize, mesh: Index<Mesh>, pose: &Pose) -> Resu
 }
 
 /// Where a node's mesh stands: once, unless an extension instances it.
-fn placements(source: GltfSource, path: &str, node: usize, world: DAffine3, draft: &mut Draft) -> Result<Vec<DAffine3>> {
+fn placements(
+    source: GltfSource,
+    path: &str,
+    node: usize,
+    world: DAffine3,
+    draft: &mut Draft,
+) -> Result<Vec<DAffine3>> {
     const NAME: &str = "EXT_mesh_gpu_instancing";
     let json = source.root.nodes.get(node);
     let extensions = json.and_then(|json| json.extensions.as_ref()).map(|extensions| &extensions.others);
@@ -139,7 +153,8 @@ fn placements(source: GltfSource, path: &str, node: usize, world: DAffine3, draf
     let instance = |i: usize| {
         let vector = |floats: [f32; 3]| DVec3::from(floats.map(f64::from));
         let translation = translations.as_ref().map_or(DVec3::ZERO, |column| vector(column.floats(i)));
-        let rotation = rotations.as_ref().and_then(|column| unit(DQuat::from_array(column.floats::<4>(i).map(f64::from))));
+        let rotation =
+            rotations.as_ref().and_then(|column| unit(DQuat::from_array(column.floats::<4>(i).map(f64::from))));
         let scale = scales.as_ref().map_or(DVec3::ONE, |column| vector(column.floats(i)));
         world * DAffine3::from_scale_rotation_translation(scale, rotation.unwrap_or(DQuat::IDENTITY), translation)
     };
@@ -170,7 +185,14 @@ impl Builder<'_, '_> {
     }
 
     /// Adds the triangles of a primitive to the shapes of its form.
-    fn add_shape(&mut self, path: &str, name: &str, primitive: &Primitive, deformation: Deformation, shapes: &mut Shapes) -> Result<()> {
+    fn add_shape(
+        &mut self,
+        path: &str,
+        name: &str,
+        primitive: &Primitive,
+        deformation: Deformation,
+        shapes: &mut Shapes,
+    ) -> Result<()> {
         let source = self.source;
         let Some(mut triangles) = geometry::triangles(source, path, primitive, deformation)? else {
             self.draft.ignored(path, "primitive", "", "has no triangles");
@@ -183,18 +205,28 @@ impl Builder<'_, '_> {
         let mut data = triangles.data;
         data.attributes.retain(|_, _| material.vertex_colors);
         if material.uv_set.is_some() && data.uvs.is_none() {
-            self.draft.approximated(path, "primitive", "TEXCOORD", "there is no uv for the textures: they show the colour of one corner");
+            self.draft.approximated(
+                path,
+                "primitive",
+                "TEXCOORD",
+                "there is no uv for the textures: they show the colour of one corner",
+            );
             data.uvs = Some(vec![[0.0, 1.0]; data.positions.len()]);
         }
         self.report(path, primitive);
-        self.gives_light |= material.emission.as_ref().is_some_and(|emission| emission.radiance.iter().any(|r| *r > 1.0));
+        self.gives_light |=
+            material.emission.as_ref().is_some_and(|emission| emission.radiance.iter().any(|r| *r > 1.0));
 
         for p in data.positions.iter().filter(|p| p.iter().all(|x| x.is_finite())) {
             shapes.grow(DVec3::from(p.map(f64::from)));
         }
-        let bytes = data.positions.len() * (32 + if material.vertex_colors { 12 } else { 0 }) + data.triangles.len() * 12;
+        let bytes =
+            data.positions.len() * (32 + if material.vertex_colors { 12 } else { 0 }) + data.triangles.len() * 12;
         self.budget = self.budget.checked_sub(bytes).ok_or_else(|| {
-            source.fault(path, "the meshes of the file are far larger than its buffers: the same data is used again and again")
+            source.fault(
+                path,
+                "the meshes of the file are far larger than its buffers: the same data is used again and again",
+            )
         })?;
         let mut desc = MeshDesc::from_file(self.draft.keep_mesh(name, data));
         desc.name = Some(name.into());
@@ -211,7 +243,12 @@ impl Builder<'_, '_> {
         let material = primitive.material.and_then(|index| self.source.root.get(index));
         let has_normal_map = material.is_some_and(|material| material.normal_texture.is_some());
         if has_normal_map && geometry::attribute(primitive, Semantic::Tangents).is_some() {
-            self.draft.ignored(path, "primitive", "TANGENT", "tangents are MikkTSpace's, from positions, normals and uv");
+            self.draft.ignored(
+                path,
+                "primitive",
+                "TANGENT",
+                "tangents are MikkTSpace's, from positions, normals and uv",
+            );
         }
     }
 

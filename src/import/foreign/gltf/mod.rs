@@ -51,7 +51,8 @@ impl GltfSource<'_> {
 /// [`Error::Missing`] if it or one of its buffers cannot be read, [`Error::Parse`] or [`Error::Scene`] for faults in
 /// it.
 pub fn read(path: &Path, options: &ImportOptions) -> Result<Imported> {
-    let bytes = crate::file::read_stream(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
+    let bytes =
+        crate::file::read_stream(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
     let document = document::parse(path, &bytes)?;
     let buffers = Buffers::load(path, &document.root, document.bin)?;
     let source = GltfSource { file: path, root: &document.root, buffers: &buffers };

@@ -39,7 +39,10 @@ impl Tree {
                 let place = format!("nodes[{i}].children[{k}]");
                 match parents.get_mut(child) {
                     Some(Some(other)) => {
-                        return Err(source.fault(&place, format!("nodes[{child}] is below nodes[{other}] too: a node has one parent")));
+                        return Err(source.fault(
+                            &place,
+                            format!("nodes[{child}] is below nodes[{other}] too: a node has one parent"),
+                        ));
                     }
                     Some(parent) => *parent = Some(i),
                     None => return Err(source.fault(&place, "there is no such node")),
@@ -53,7 +56,10 @@ impl Tree {
             let mut reached = vec![false; nodes.len()];
             order.iter().for_each(|&i| reached[i] = true);
             let lost = reached.iter().position(|reached| !reached).unwrap_or_default();
-            return Err(source.fault(&format!("nodes[{lost}]"), "is below itself, or below a node that is: nodes must not form a cycle"));
+            return Err(source.fault(
+                &format!("nodes[{lost}]"),
+                "is below itself, or below a node that is: nodes must not form a cycle",
+            ));
         }
         let shown = below(nodes, &shown_roots(source, &parents, roots, draft)?);
         Ok(Self { parents, order, shown })
@@ -76,7 +82,12 @@ impl Tree {
 }
 
 /// The roots of the scene that the file means.
-fn shown_roots(source: GltfSource, parents: &[Option<usize>], roots: Vec<usize>, draft: &mut Draft) -> Result<Vec<usize>> {
+fn shown_roots(
+    source: GltfSource,
+    parents: &[Option<usize>],
+    roots: Vec<usize>,
+    draft: &mut Draft,
+) -> Result<Vec<usize>> {
     let scenes = &source.root.scenes;
     let chosen = source.root.scene.map_or(0, |index| index.value());
     let Some(scene) = scenes.get(chosen) else {
@@ -132,16 +143,18 @@ fn local(source: GltfSource, path: &str, node: &scene::Node, motion: &Motion, in
             DAffine3 { matrix3: DMat3::from_cols(column(0), column(4), column(8)), translation: column(12) }
         }
         None => {
-            let [x, y, z, w] = node.rotation.as_ref().map_or([0.0, 0.0, 0.0, 1.0], |rotation| rotation.0).map(f64::from);
-            let rotation =
-                unit(DQuat::from_xyzw(x, y, z, w)).ok_or_else(|| source.fault(&format!("{path}.rotation"), "is not a rotation"))?;
+            let [x, y, z, w] =
+                node.rotation.as_ref().map_or([0.0, 0.0, 0.0, 1.0], |rotation| rotation.0).map(f64::from);
+            let rotation = unit(DQuat::from_xyzw(x, y, z, w))
+                .ok_or_else(|| source.fault(&format!("{path}.rotation"), "is not a rotation"))?;
             DAffine3::from_scale_rotation_translation(vector(node.scale, 1.0), rotation, vector(node.translation, 0.0))
         }
     };
     if !given.is_finite() {
         return Err(source.fault(path, "the transform is not finite"));
     }
-    let (translation, rotation, scale) = (motion.translations.get(&index), motion.rotations.get(&index), motion.scales.get(&index));
+    let (translation, rotation, scale) =
+        (motion.translations.get(&index), motion.rotations.get(&index), motion.scales.get(&index));
     if translation.is_none() && rotation.is_none() && scale.is_none() {
         return Ok(given);
     }
@@ -149,7 +162,8 @@ fn local(source: GltfSource, path: &str, node: &scene::Node, motion: &Motion, in
     let (s, r, t) = match node.matrix {
         Some(_) => given.to_scale_rotation_translation(),
         None => {
-            let [x, y, z, w] = node.rotation.as_ref().map_or([0.0, 0.0, 0.0, 1.0], |rotation| rotation.0).map(f64::from);
+            let [x, y, z, w] =
+                node.rotation.as_ref().map_or([0.0, 0.0, 0.0, 1.0], |rotation| rotation.0).map(f64::from);
             (vector(node.scale, 1.0), unit(DQuat::from_xyzw(x, y, z, w)).unwrap_or(DQuat::IDENTITY), given.translation)
         }
     };

@@ -15,7 +15,9 @@ pub fn joints(source: GltfSource, index: Index<Skin>, pose: &Pose) -> Result<Vec
     let path = format!("skins[{}]", index.value());
     let skin = source.root.get(index).ok_or_else(|| source.fault(&path, "there is no such skin"))?;
     let binds = match skin.inverse_bind_matrices {
-        Some(accessor) => Some(source.column(&format!("{path}.inverseBindMatrices"), accessor, &[Type::Mat4], AccessorUse::Floats)?),
+        Some(accessor) => {
+            Some(source.column(&format!("{path}.inverseBindMatrices"), accessor, &[Type::Mat4], AccessorUse::Floats)?)
+        }
         None => None,
     };
     if let Some(binds) = binds.as_ref().filter(|binds| binds.count() < skin.joints.len()) {

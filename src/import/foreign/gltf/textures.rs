@@ -37,8 +37,15 @@ pub struct TextureSet {
 
 impl TextureRef {
     /// A texture with its extensions.
-    pub fn new(source: GltfSource, place: &str, index: usize, uv_set: u32, extensions: Option<&Map<String, Value>>) -> Result<Self> {
-        let transform: TextureTransform = source.extension(place, extensions, "KHR_texture_transform")?.unwrap_or_default();
+    pub fn new(
+        source: GltfSource,
+        place: &str,
+        index: usize,
+        uv_set: u32,
+        extensions: Option<&Map<String, Value>>,
+    ) -> Result<Self> {
+        let transform: TextureTransform =
+            source.extension(place, extensions, "KHR_texture_transform")?.unwrap_or_default();
         let numbers = [transform.offset, transform.scale].concat();
         if !numbers.iter().all(|x| x.is_finite()) || !transform.rotation.is_finite() {
             return Err(source.fault(&format!("{place}.extensions.KHR_texture_transform"), "is not finite"));
@@ -64,7 +71,8 @@ impl TextureSet {
         channel: Option<ChannelDesc>,
     ) -> Result<Option<String>> {
         let json = source.root.textures.get(texture.index);
-        let json = json.ok_or_else(|| source.fault(&texture.place, format!("there is no textures[{}]", texture.index)))?;
+        let json =
+            json.ok_or_else(|| source.fault(&texture.place, format!("there is no textures[{}]", texture.index)))?;
         let path = format!("textures[{}]", texture.index);
         // An index of all ones means none.
         let Some(image) = source.root.images.get(json.source.value()).map(|_| json.source.value()) else {
@@ -202,7 +210,11 @@ mod tests {
             // A quarter turn counter-clockwise as the image is seen takes the u axis up, where v is negative.
             (TextureTransform { rotation: quarter, ..TextureTransform::default() }, [1.0, 0.0], [0.0, -1.0]),
             (TextureTransform { rotation: quarter, ..TextureTransform::default() }, [0.0, 1.0], [1.0, 0.0]),
-            (TextureTransform { offset: [0.5, 0.25], rotation: quarter, scale: [2.0, 4.0], tex_coord: None }, [1.0, 0.5], [2.5, -1.75]),
+            (
+                TextureTransform { offset: [0.5, 0.25], rotation: quarter, scale: [2.0, 4.0], tex_coord: None },
+                [1.0, 0.5],
+                [2.5, -1.75],
+            ),
         ];
         for (transform, [u, v], [to_u, to_v]) in cases {
             let found = ours([u, 1.0 - v], flipped(&transform));

@@ -5,8 +5,8 @@ use super::textures::{Role, TextureValue, UvOrigin};
 use super::tree::PluginId;
 use super::{Reader, names};
 use crate::desc::{
-    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, OpacityDesc, PlasticDesc,
-    RangedDesc, RoughnessDesc, ScalarDesc, TextureDesc,
+    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, OpacityDesc,
+    PlasticDesc, RangedDesc, RoughnessDesc, ScalarDesc, TextureDesc,
 };
 use crate::error::Result;
 use crate::metal::{Metal, MetalNames};
@@ -25,11 +25,17 @@ pub(crate) struct BsdfBinding {
 
 impl<'a> Reader<'a> {
     /// The material of a shape, and its opacity. Without a BSDF, Mitsuba's default: a grey diffuse front.
-    pub(super) fn surface(&mut self, id: Option<PluginId>, place: &str, uv: UvOrigin) -> Result<(String, Option<OpacityDesc>)> {
+    pub(super) fn surface(
+        &mut self,
+        id: Option<PluginId>,
+        place: &str,
+        uv: UvOrigin,
+    ) -> Result<(String, Option<OpacityDesc>)> {
         let Some(id) = id else {
             let name = "default_front_only";
             if !self.draft.desc.materials.contains_key(name) {
-                let front = MaterialDesc::Diffuse { albedo: ColorDesc::Grey(0.5), roughness: ScalarDesc::Constant(0.0) };
+                let front =
+                    MaterialDesc::Diffuse { albedo: ColorDesc::Grey(0.5), roughness: ScalarDesc::Constant(0.0) };
                 let front = self.draft.add_material("default", place, front);
                 let back = self.black(place);
                 self.draft.add_material(name, place, MaterialDesc::TwoSided { front, back });
@@ -206,14 +212,21 @@ impl<'a> Reader<'a> {
     }
 
     /// The distribution of the normals of a surface's microfacets and its width, if the surface is of a `rough` kind.
-    fn microfacets(&mut self, element: &mut Element<'a>, rough: &str, uv: UvOrigin) -> Result<(Option<RoughnessDesc>, DistributionDesc)> {
+    fn microfacets(
+        &mut self,
+        element: &mut Element<'a>,
+        rough: &str,
+        uv: UvOrigin,
+    ) -> Result<(Option<RoughnessDesc>, DistributionDesc)> {
         if element.kind() != rough {
             return Ok((None, DistributionDesc::default()));
         }
         let distribution = match element.text("distribution")?.unwrap_or("beckmann") {
             "ggx" => DistributionDesc::GgxSeparable,
             "beckmann" => DistributionDesc::Beckmann,
-            other => return Err(element.place_of("distribution").error(format!("\"{other}\" is neither beckmann nor ggx"))),
+            other => {
+                return Err(element.place_of("distribution").error(format!("\"{other}\" is neither beckmann nor ggx")));
+            }
         };
         element.boolean("sample_visible", true)?;
         Ok((Some(self.alpha(element, uv)?), distribution))
@@ -240,7 +253,12 @@ impl<'a> Reader<'a> {
     }
 
     /// The BSDFs inside of one.
-    fn parts(&mut self, element: &mut Element<'a>, counts: std::ops::RangeInclusive<usize>, uv: UvOrigin) -> Result<Vec<BsdfBinding>> {
+    fn parts(
+        &mut self,
+        element: &mut Element<'a>,
+        counts: std::ops::RangeInclusive<usize>,
+        uv: UvOrigin,
+    ) -> Result<Vec<BsdfBinding>> {
         let parts = element.all("bsdf")?;
         if !counts.contains(&parts.len()) {
             let message = format!("{} needs {} bsdfs inside, not {}", element.kind(), counts.end(), parts.len());
@@ -266,7 +284,9 @@ impl<'a> Reader<'a> {
         let inner = self.one_part(element, uv)?;
         let opacity = match self.scalar(element, "opacity", 0.5, 1.0, uv)? {
             ScalarDesc::Constant(v) => OpacityDesc::Number(v),
-            ScalarDesc::Texture { texture } => OpacityDesc::Texture { texture: self.without_alpha(&texture, element), threshold: None },
+            ScalarDesc::Texture { texture } => {
+                OpacityDesc::Texture { texture: self.without_alpha(&texture, element), threshold: None }
+            }
         };
         if inner.opacity.is_some() {
             element.ignored("", "the holes of the bsdf inside are left out");
@@ -299,8 +319,9 @@ impl<'a> Reader<'a> {
         if parts.iter().any(|part| part.opacity.is_some()) {
             element.ignored("", "holes of a part are left out");
         }
-        let materials =
-            parts.iter().map(|part| if part.one_sided && !one_sided { self.front_only(part, &place) } else { part.material.clone() });
+        let materials = parts.iter().map(|part| {
+            if part.one_sided && !one_sided { self.front_only(part, &place) } else { part.material.clone() }
+        });
         let materials: Vec<String> = materials.collect();
         let Ok(materials) = <[String; 2]>::try_from(materials) else {
             return Err(element.place().error("blendbsdf needs two bsdfs inside"));
@@ -333,7 +354,12 @@ impl<'a> Reader<'a> {
                 self.draft.desc.textures.get_mut(&texture)
         {
             *color_space = ColorSpaceDesc::Linear;
-            self.draft.approximated(&texture_place.to_string(), &element.plugin.title(), "raw", "normals are taken as they are stored");
+            self.draft.approximated(
+                &texture_place.to_string(),
+                &element.plugin.title(),
+                "raw",
+                "normals are taken as they are stored",
+            );
         }
         let (normal_map, bump_map) = if is_normal_map {
             // Steradian's turn with the image, Mitsuba's do not: on v that grows downward green is the other way round.
@@ -350,7 +376,8 @@ impl<'a> Reader<'a> {
         } else {
             (None, Some(BumpMapDesc { texture, height: height as f32 }))
         };
-        let binding = self.add(element, MaterialDesc::Relief { material: inner.material, normal_map, bump_map }, inner.one_sided);
+        let binding =
+            self.add(element, MaterialDesc::Relief { material: inner.material, normal_map, bump_map }, inner.one_sided);
         Ok(BsdfBinding { opacity: inner.opacity, ..binding })
     }
 }

@@ -63,12 +63,15 @@ impl<'a> Element<'a> {
             return Ok(None);
         };
         let count = u32::try_from(value).ok().filter(|&count| count >= least);
-        count.map(Some).ok_or_else(|| self.place_of(name).error(format!("\"{name}\" must be at least {least}, not {value}")))
+        count
+            .map(Some)
+            .ok_or_else(|| self.place_of(name).error(format!("\"{name}\" must be at least {least}, not {value}")))
     }
 
     /// Whether something is the case.
     pub fn boolean(&mut self, name: &str, default: bool) -> Result<bool> {
-        let given = self.typed(name, "a boolean", |value| if let Value::Boolean(v) = value { Some(*v) } else { None })?;
+        let given =
+            self.typed(name, "a boolean", |value| if let Value::Boolean(v) = value { Some(*v) } else { None })?;
         Ok(given.unwrap_or(default))
     }
 
@@ -89,7 +92,8 @@ impl<'a> Element<'a> {
 
     /// A transform; the identity if it is not given.
     pub fn transform(&mut self, name: &str) -> Result<DAffine3> {
-        let given = self.typed(name, "a transform", |value| if let Value::Transform(v) = value { Some(*v) } else { None })?;
+        let given =
+            self.typed(name, "a transform", |value| if let Value::Transform(v) = value { Some(*v) } else { None })?;
         Ok(given.unwrap_or(DAffine3::IDENTITY))
     }
 
@@ -100,7 +104,9 @@ impl<'a> Element<'a> {
             Some((Value::Float(v), _)) if *v > 0.0 => Ok(*v),
             Some((Value::Integer(v), _)) if *v > 0 => Ok(*v as f64),
             Some((Value::Text(material), place)) => names::index(material).map_err(|message| place.error(message)),
-            Some((_, place)) => Err(place.error(format!("\"{name}\" must be a number above 0 or the name of a material"))),
+            Some((_, place)) => {
+                Err(place.error(format!("\"{name}\" must be a number above 0 or the name of a material")))
+            }
         }
     }
 
@@ -113,7 +119,11 @@ impl<'a> Element<'a> {
 
     /// Where a parameter stands; the plugin, if it does not exist.
     pub fn place_of(&self, name: &str) -> &'a Place {
-        self.plugin.properties.iter().find(|property| property.name == name).map_or(&self.plugin.place, |property| &property.place)
+        self.plugin
+            .properties
+            .iter()
+            .find(|property| property.name == name)
+            .map_or(&self.plugin.place, |property| &property.place)
     }
 
     /// All plugins of a class in or referred to by it, whatever their names, with their places.
@@ -197,7 +207,9 @@ impl<'a> Element<'a> {
             match outcome {
                 Some((outcome, note)) => draft.note(&place, &title, &name, outcome, note),
                 None if is_ignored => draft.ignored(&place, &title, &name, PART_OF_IGNORED),
-                None => draft.ignored(&place, &title, &name, format!("unsupported parameter of a {}", self.plugin.kind)),
+                None => {
+                    draft.ignored(&place, &title, &name, format!("unsupported parameter of a {}", self.plugin.kind));
+                }
             }
         }
     }

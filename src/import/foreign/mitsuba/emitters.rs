@@ -11,8 +11,8 @@ use super::values;
 use crate::assets::{RgbImage, read_image};
 use crate::color::linear_from_srgb;
 use crate::desc::{
-    DirectionalLightDesc, EmissionDesc, EnvironmentLightDesc, LightDesc, PointLightDesc, ProjectorLightDesc, SpotLightDesc, TextureDesc,
-    TransformDesc, TransformStepDesc,
+    DirectionalLightDesc, EmissionDesc, EnvironmentLightDesc, LightDesc, PointLightDesc, ProjectorLightDesc,
+    SpotLightDesc, TextureDesc, TransformDesc, TransformStepDesc,
 };
 use crate::error::Result;
 use crate::image_data::{ImageData, Samples};
@@ -79,7 +79,12 @@ impl<'a> Reader<'a> {
                 element.take("radiance");
                 EmissionDesc { radiance: [1.0; 3], texture: Some(texture), two_sided: false, group: None }
             }
-            _ => EmissionDesc { radiance: self.emitted(&mut element, "radiance")?, texture: None, two_sided: false, group: None },
+            _ => EmissionDesc {
+                radiance: self.emitted(&mut element, "radiance")?,
+                texture: None,
+                two_sided: false,
+                group: None,
+            },
         };
         element.finish(&mut self.draft);
         Ok(Some(emission))
@@ -153,7 +158,9 @@ impl<'a> Reader<'a> {
         let picture = match element.take("irradiance") {
             None => TextureValue::Constant([1.0; 3]),
             Some(property) => match (&property.value, self.document.plugin_of(property)?) {
-                (_, Some(id)) if self.document.plugins[id.0].class == "texture" => self.texture(id, Role::Color, UvOrigin::Upward)?,
+                (_, Some(id)) if self.document.plugins[id.0].class == "texture" => {
+                    self.texture(id, Role::Color, UvOrigin::Upward)?
+                }
                 _ => TextureValue::Constant(self.emitted(element, "irradiance")?),
             },
         };
@@ -184,7 +191,8 @@ impl<'a> Reader<'a> {
         let ratio = |image: &ImageData| image.width as f64 / image.height as f64;
         match self.draft.assets.images.get(file) {
             Some(image) => ratio(image),
-            None => read_image(&self.scene.parent().unwrap_or(std::path::Path::new("")).join(file)).map_or(1.0, |image| ratio(&image)),
+            None => read_image(&self.scene.parent().unwrap_or(std::path::Path::new("")).join(file))
+                .map_or(1.0, |image| ratio(&image)),
         }
     }
 
@@ -194,7 +202,12 @@ impl<'a> Reader<'a> {
             Some(direction) => direction,
             None => element.transform("to_world")?.matrix3.z_axis.to_array(),
         };
-        Ok(LightDesc::Directional(DirectionalLightDesc { direction, irradiance, angular_diameter_degrees: 0.0, group: None }))
+        Ok(LightDesc::Directional(DirectionalLightDesc {
+            direction,
+            irradiance,
+            angular_diameter_degrees: 0.0,
+            group: None,
+        }))
     }
 
     fn environment(&mut self, element: &mut Element<'a>) -> Result<LightDesc> {
@@ -205,14 +218,25 @@ impl<'a> Reader<'a> {
         let map = element.transform("to_world")?;
         let transform = rotation(element, &map);
         let extension = name.rsplit('.').next().unwrap_or_default().to_lowercase();
-        let file = if matches!(extension.as_str(), "exr" | "hdr") { name } else { self.converted_environment(element, &name)? };
-        Ok(LightDesc::Environment(EnvironmentLightDesc { radiance: None, file: Some(file), scale, transform, group: None }))
+        let file = if matches!(extension.as_str(), "exr" | "hdr") {
+            name
+        } else {
+            self.converted_environment(element, &name)?
+        };
+        Ok(LightDesc::Environment(EnvironmentLightDesc {
+            radiance: None,
+            file: Some(file),
+            scale,
+            transform,
+            group: None,
+        }))
     }
 
     /// An image of whole numbers as an environment.
     fn converted_environment(&mut self, element: &Element<'a>, name: &str) -> Result<String> {
         let path = self.scene.parent().unwrap_or(std::path::Path::new("")).join(name);
-        let image = read_image(&path).map_err(|e| e.at(self.scene, &element.place_of("filename").to_string(), &path))?;
+        let image =
+            read_image(&path).map_err(|e| e.at(self.scene, &element.place_of("filename").to_string(), &path))?;
         self.draft.files.insert(path);
         Ok(self.draft.keep_environment(name.rsplit('/').next().unwrap_or(name), as_environment(&image)))
     }

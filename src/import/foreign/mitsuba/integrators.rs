@@ -30,7 +30,9 @@ impl Reader<'_> {
             "moment" | "aov" | "stokes" => {
                 match element.one("integrator")? {
                     Some(inner) => self.integrator(inner)?,
-                    None => return Err(element.place().error(format!("the integrator {kind} needs another one inside"))),
+                    None => {
+                        return Err(element.place().error(format!("the integrator {kind} needs another one inside")));
+                    }
                 }
                 // Moments are beside the picture, which is that of the integrator inside.
                 if kind != "moment" {
@@ -53,7 +55,10 @@ impl Reader<'_> {
             }
             "ptracer" => {
                 self.draft.desc.integrator = path(&mut element)?;
-                element.approximated("", "path tracing from the camera, which has the same mean, in place of light tracing");
+                element.approximated(
+                    "",
+                    "path tracing from the camera, which has the same mean, in place of light tracing",
+                );
             }
             "direct" | "emission_direct" => {
                 self.draft.desc.integrator = IntegratorDesc::path(2, 5);

@@ -17,7 +17,8 @@ pub fn cube() -> MeshDesc {
         [[-1.0, -1.0, 1.0], [-1.0, 1.0, 1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, -1.0]],
         [[1.0, 1.0, -1.0], [1.0, -1.0, -1.0], [-1.0, -1.0, -1.0], [-1.0, 1.0, -1.0]],
     ];
-    let triangles = (0..6).flat_map(|face| [[4 * face, 4 * face + 1, 4 * face + 2], [4 * face + 3, 4 * face, 4 * face + 2]]);
+    let triangles =
+        (0..6).flat_map(|face| [[4 * face, 4 * face + 1, 4 * face + 2], [4 * face + 3, 4 * face, 4 * face + 2]]);
     let mut mesh = MeshDesc::from_file("");
     mesh.file = None;
     mesh.positions = Some(FACES.concat().into_iter().map(|p| p.map(f64::from)).collect());
@@ -33,8 +34,11 @@ pub fn without_uvs(path: &Path) -> Option<MeshData> {
     if has(path, &[" u", " s", " texture_u"], b"vt ") {
         return None;
     }
-    let mut meshes =
-        if is_obj { read_obj(path, false).ok()?.into_iter().map(|part| part.mesh).collect() } else { vec![read_ply(path).ok()?] };
+    let mut meshes = if is_obj {
+        read_obj(path, false).ok()?.into_iter().map(|part| part.mesh).collect()
+    } else {
+        vec![read_ply(path).ok()?]
+    };
     meshes.pop().filter(|mesh| meshes.is_empty() && mesh.uvs.is_none())
 }
 
@@ -50,7 +54,9 @@ pub fn has_normals(path: &Path) -> bool {
 
 /// Whether the header of a PLY file has a property whose line ends in one of these, or a line of an OBJ file begins so.
 fn has(path: &Path, endings: &[&str], word: &[u8]) -> bool {
-    let Ok(source) = crate::file::open(path).and_then(|file| crate::file::skip_mark(BufReader::new(file))) else { return false };
+    let Ok(source) = crate::file::open(path).and_then(|file| crate::file::skip_mark(BufReader::new(file))) else {
+        return false;
+    };
     let begins = |line: &[u8], word: &[u8]| line.trim_ascii().starts_with(word);
     let mut lines = source.split(b'\n').map_while(std::io::Result::ok).peekable();
     if lines.peek().is_some_and(|line| begins(line, b"ply")) {

@@ -85,7 +85,9 @@ impl<'a> Reader<'a> {
             ..base
         };
         let place = element.place().to_string();
-        let part = |reader: &mut Self, name: &str, desc| reader.draft.add_material(name, &place, MaterialDesc::Principled(Box::new(desc)));
+        let part = |reader: &mut Self, name: &str, desc| {
+            reader.draft.add_material(name, &place, MaterialDesc::Principled(Box::new(desc)))
+        };
         let materials = [part(self, "thin_sheet", sheet), part(self, "thin_pane", pane)];
         Ok(self.add(element, MaterialDesc::Mix { materials, amount }, false))
     }

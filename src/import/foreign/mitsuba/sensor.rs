@@ -3,7 +3,9 @@
 use super::element::Element;
 use super::tree::{PluginId, Value};
 use super::{Reader, values};
-use crate::desc::{CameraDesc, CameraKindDesc, FilterDesc, LensDesc, OutputDesc, PixelTypeDesc, TransformDesc, TransformStepDesc};
+use crate::desc::{
+    CameraDesc, CameraKindDesc, FilterDesc, LensDesc, OutputDesc, PixelTypeDesc, TransformDesc, TransformStepDesc,
+};
 use crate::error::Result;
 use crate::import::foreign::draft::SOBOL_FOR_INDEPENDENT;
 use crate::math::{DAffine3, DMat3, DVec3};
@@ -59,8 +61,10 @@ impl Reader<'_> {
         } else {
             camera.vertical_fov_degrees = Some(fov(&mut element, aspect)?);
             // What would be seen at this offset from the middle, to the right and down, is seen in the middle.
-            let offset =
-                [element.float("principal_point_offset_x")?.unwrap_or(0.0), element.float("principal_point_offset_y")?.unwrap_or(0.0)];
+            let offset = [
+                element.float("principal_point_offset_x")?.unwrap_or(0.0),
+                element.float("principal_point_offset_y")?.unwrap_or(0.0),
+            ];
             if offset != [0.0; 2] {
                 camera.shift = Some([offset[0], -offset[1]]);
             }
@@ -101,7 +105,8 @@ impl Reader<'_> {
         ];
         if crop.iter().any(Option::is_some) {
             let [x, y, width, height] = crop;
-            film.crop = Some([x.unwrap_or(0), y.unwrap_or(0), width.unwrap_or(film.width), height.unwrap_or(film.height)]);
+            film.crop =
+                Some([x.unwrap_or(0), y.unwrap_or(0), width.unwrap_or(film.width), height.unwrap_or(film.height)]);
         }
         film.filter = match element.one("rfilter")? {
             Some(filter) => self.filter(filter)?,
@@ -114,7 +119,8 @@ impl Reader<'_> {
             element.ignored("file_format", "the format follows from the extension of the output");
         }
         if element.text("component_format")?.is_some_and(|format| format != "float16") {
-            let stem = self.scene.file_stem().map_or_else(|| "scene".into(), |stem| stem.to_string_lossy().into_owned());
+            let stem =
+                self.scene.file_stem().map_or_else(|| "scene".into(), |stem| stem.to_string_lossy().into_owned());
             let exr = OutputDesc { pixel_type: PixelTypeDesc::Float, ..OutputDesc::new(format!("{stem}.exr")) };
             self.draft.desc.outputs = vec![exr, OutputDesc::new(format!("{stem}.png"))];
         }
@@ -130,7 +136,8 @@ impl Reader<'_> {
     /// The film of a sensor without one.
     fn default_film(&mut self) -> f64 {
         let film = &mut self.draft.desc.film;
-        (film.width, film.height, film.filter) = (768, 576, FilterDesc::Gaussian { radius: 2.0, sigma: 0.5, samples: None });
+        (film.width, film.height, film.filter) =
+            (768, 576, FilterDesc::Gaussian { radius: 2.0, sigma: 0.5, samples: None });
         768.0 / 576.0
     }
 
@@ -145,7 +152,12 @@ impl Reader<'_> {
             }
             "mitchell" => {
                 let (b, c) = (element.float("B")?, element.float("C")?);
-                FilterDesc::Mitchell { radius: 2.0, b: b.unwrap_or(1.0 / 3.0) as f32, c: c.unwrap_or(1.0 / 3.0) as f32, samples: None }
+                FilterDesc::Mitchell {
+                    radius: 2.0,
+                    b: b.unwrap_or(1.0 / 3.0) as f32,
+                    c: c.unwrap_or(1.0 / 3.0) as f32,
+                    samples: None,
+                }
             }
             other => {
                 if other == "lanczos" {
@@ -179,14 +191,17 @@ impl Reader<'_> {
 pub(super) fn fov(element: &mut Element, aspect: f64) -> Result<f64> {
     let focal_length = element.text("focal_length")?;
     let (fov, axis) = match (element.float("fov")?, focal_length) {
-        (Some(_), Some(_)) => return Err(element.place_of("focal_length").error("give either \"fov\" or \"focal_length\"")),
+        (Some(_), Some(_)) => {
+            return Err(element.place_of("focal_length").error("give either \"fov\" or \"focal_length\""));
+        }
         (Some(fov), None) => (fov, element.text("fov_axis")?.unwrap_or("x")),
         (None, text) => {
             let text = text.unwrap_or("50mm");
             let number = values::number(text.trim().strip_suffix("mm").unwrap_or(text));
             let length = number.ok().filter(|&length| length > 0.0);
-            let length =
-                length.ok_or_else(|| element.place_of("focal_length").error(format!("\"{text}\" is not a focal length, as 50mm")))?;
+            let length = length.ok_or_else(|| {
+                element.place_of("focal_length").error(format!("\"{text}\" is not a focal length, as 50mm"))
+            })?;
             if element.take("fov_axis").is_some() {
                 element.ignored("fov_axis", "the focal length is that of a film of 36 x 24 mm, by the diagonal");
             }
@@ -225,9 +240,14 @@ fn placement(element: &mut Element, map: &DAffine3) -> Result<TransformDesc> {
         element.approximated("to_world", "the camera mirrors the picture, which is not supported: it is not mirrored");
     } else if y.dot(m.y_axis.normalize_or_zero()) < 1.0 - 1e-4 {
         element.approximated("to_world", "the camera's transform shears, which is left out");
-    } else if element.kind() != "orthographic" && matches!(element.take("to_world").map(|p| &p.value), Some(Value::Transform(_))) {
+    } else if element.kind() != "orthographic"
+        && matches!(element.take("to_world").map(|p| &p.value), Some(Value::Transform(_)))
+    {
         let scale = m.x_axis.length();
-        if (scale - 1.0).abs() > 1e-3 || (m.y_axis.length() - scale).abs() > 1e-3 || (m.z_axis.length() - scale).abs() > 1e-3 {
+        if (scale - 1.0).abs() > 1e-3
+            || (m.y_axis.length() - scale).abs() > 1e-3
+            || (m.z_axis.length() - scale).abs() > 1e-3
+        {
             element.approximated("to_world", "a camera has no scale: it is left out");
         }
     }

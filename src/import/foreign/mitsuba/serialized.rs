@@ -26,7 +26,8 @@ const CHUNK: usize = 1 << 16;
 /// # Errors
 /// If the file is missing or malformed or has no such mesh.
 pub fn read(path: &Path, index: u32) -> Result<MeshData, AssetError> {
-    let bytes = crate::file::read(path).map_err(|e| AssetError::Missing { file: path.into(), message: e.to_string() })?;
+    let bytes =
+        crate::file::read(path).map_err(|e| AssetError::Missing { file: path.into(), message: e.to_string() })?;
     parse(&bytes, index).map_err(AssetError::Malformed)
 }
 
@@ -40,9 +41,14 @@ fn parse(bytes: &[u8], index: u32) -> Result<MeshData, String> {
     }
     // Offsets of all meshes stand before their number.
     let width = if version >= 4 { 8 } else { 4 };
-    let table = usize::try_from(count).ok().and_then(|count| count_at.checked_sub(count.checked_mul(width)?)).ok_or_else(short)?;
+    let table = usize::try_from(count)
+        .ok()
+        .and_then(|count| count_at.checked_sub(count.checked_mul(width)?))
+        .ok_or_else(short)?;
     let offset = number(bytes, table + index as usize * width, width).and_then(|offset| usize::try_from(offset).ok());
-    let mesh = offset.and_then(|offset| bytes.get(offset..table)).ok_or("an offset in the serialized file lies outside of it")?;
+    let mesh = offset
+        .and_then(|offset| bytes.get(offset..table))
+        .ok_or("an offset in the serialized file lies outside of it")?;
     let version = header(mesh).ok_or("an offset in the serialized file does not lead to a mesh")?;
     let packed = mesh.get(4..).ok_or_else(short)?;
     let limit = MAX_EXPANSION.saturating_mul(packed.len() as u64).saturating_add(CHUNK as u64);
@@ -87,8 +93,15 @@ fn decode(stream: &mut impl Read, version: u64) -> Result<MeshData, String> {
     let mut corners = Vec::new();
     let count = triangles.checked_mul(3).ok_or("too many triangles")?;
     values::<4>(stream, count, |bytes| corners.push(u32::from_le_bytes(bytes)))?;
-    Ok(MeshData { positions, triangles: corners.as_chunks::<3>().0.to_vec(), normals, uvs, origin, ..MeshData::default() }
-        .with_colors(colors))
+    Ok(MeshData {
+        positions,
+        triangles: corners.as_chunks::<3>().0.to_vec(),
+        normals,
+        uvs,
+        origin,
+        ..MeshData::default()
+    }
+    .with_colors(colors))
 }
 
 /// `count` tuples of floats or doubles.

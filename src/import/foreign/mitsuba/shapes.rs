@@ -7,8 +7,8 @@ use super::textures::UvOrigin;
 use super::tree::PluginId;
 use super::{Reader, meshes, serialized, values};
 use crate::desc::{
-    CylinderDesc, DiskDesc, InstanceDesc, MeshDesc, MeshShadingDesc, OpacityDesc, QuadDesc, ShapeDesc, SmoothByDesc, SphereDesc,
-    TransformDesc, TransformStepDesc,
+    CylinderDesc, DiskDesc, InstanceDesc, MeshDesc, MeshShadingDesc, OpacityDesc, QuadDesc, ShapeDesc, SmoothByDesc,
+    SphereDesc, TransformDesc, TransformStepDesc,
 };
 use crate::error::Result;
 use crate::math::{DAffine3, DMat3, DVec3};
@@ -24,7 +24,11 @@ struct Form {
 
 /// A map as the scene description has it.
 fn steps(map: &DAffine3) -> TransformDesc {
-    if *map == DAffine3::IDENTITY { TransformDesc::default() } else { TransformDesc(vec![TransformStepDesc::Matrix(values::rows(map))]) }
+    if *map == DAffine3::IDENTITY {
+        TransformDesc::default()
+    } else {
+        TransformDesc(vec![TransformStepDesc::Matrix(values::rows(map))])
+    }
 }
 
 impl<'a> Reader<'a> {
@@ -153,7 +157,8 @@ impl<'a> Reader<'a> {
         if !seen.insert(id) || seen.len() > super::MAX_REFERENCES {
             return false;
         }
-        let mut parts = plugin.properties.iter().filter_map(|property| self.document.plugin_of(property).ok().flatten());
+        let mut parts =
+            plugin.properties.iter().filter_map(|property| self.document.plugin_of(property).ok().flatten());
         matches!(plugin.kind.as_str(), "bitmap" | "checkerboard") || parts.any(|part| self.has_image(part, seen))
     }
 
@@ -164,7 +169,11 @@ impl<'a> Reader<'a> {
         let path = self.scene.parent().unwrap_or(std::path::Path::new("")).join(&file);
         let kept = self.draft.assets.meshes.get(&file).filter(|mesh| mesh.uvs.is_none()).cloned();
         let Some(mut mesh) = kept.or_else(|| meshes::without_uvs(&path)) else { return };
-        mesh.give_uvs(if uv == UvOrigin::Upward { [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]] } else { [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]] });
+        mesh.give_uvs(if uv == UvOrigin::Upward {
+            [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]]
+        } else {
+            [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
+        });
         self.draft.mapped(place, "shape", "uv");
         desc.file = Some(self.draft.keep_mesh(&file, mesh));
         // Triangles no longer share vertices.
@@ -178,7 +187,8 @@ impl<'a> Reader<'a> {
             return false;
         }
         let directed = |name: &str| matches!(name, "alpha_u" | "alpha_v" | "anisotropic");
-        let mut parts = plugin.properties.iter().filter_map(|property| self.document.plugin_of(property).ok().flatten());
+        let mut parts =
+            plugin.properties.iter().filter_map(|property| self.document.plugin_of(property).ok().flatten());
         plugin.kind == "normalmap"
             || plugin.properties.iter().any(|property| directed(&property.name))
             || parts.any(|part| self.has_direction(part, seen))
@@ -195,7 +205,9 @@ impl<'a> Reader<'a> {
                 form(ShapeDesc::Quad(quad), element.transform("to_world")?, UvOrigin::Mitsuba)
             }
             "cube" => form(ShapeDesc::Mesh(meshes::cube()), element.transform("to_world")?, UvOrigin::Mitsuba),
-            "disk" => form(ShapeDesc::Disk(DiskDesc::new(1.0, 0.0, 360.0)), element.transform("to_world")?, UvOrigin::Swapped),
+            "disk" => {
+                form(ShapeDesc::Disk(DiskDesc::new(1.0, 0.0, 360.0)), element.transform("to_world")?, UvOrigin::Swapped)
+            }
             "sphere" => {
                 let center = DVec3::from(element.vector("center")?.unwrap_or_default());
                 let radius = element.float("radius")?.unwrap_or(1.0);
@@ -236,7 +248,8 @@ impl<'a> Reader<'a> {
         self.draft.files.insert(path.clone());
         let (file, has_normals) = if kind == "serialized" {
             let index = element.count("shape_index", 0)?.unwrap_or(0);
-            let mesh = serialized::read(&path, index).map_err(|e| e.at(self.scene, &element.place_of("filename").to_string(), &path))?;
+            let mesh = serialized::read(&path, index)
+                .map_err(|e| e.at(self.scene, &element.place_of("filename").to_string(), &path))?;
             let has_normals = mesh.normals.is_some();
             (self.draft.keep_mesh(&format!("{file}_{index}"), mesh), has_normals)
         } else {

@@ -41,7 +41,8 @@ impl<'a> Reader<'a> {
         element.boolean("complex_sun", false)?;
         element.approximated(
             "",
-            "Preetham's sky, 0.6 times as bright, in place of Hosek and Wilkie's, as an image; the sun as a directional light",
+            "Preetham's sky, 0.6 times as bright, in place of Hosek and Wilkie's, as an image; the sun as a \
+             directional light",
         );
         let mut lights = Vec::new();
         if sky_scale > 0.0 {
@@ -78,7 +79,8 @@ fn sun_direction(element: &mut Element) -> Result<DVec3> {
     let given = element.vector("sun_direction")?;
     let mut number = |name: &str, default: f64| element.float(name).map(|value| value.unwrap_or(default));
     let (latitude, longitude) = (number("latitude", 35.6894)?, number("longitude", 139.6917)?);
-    let (timezone, year, month, day) = (number("timezone", 9.0)?, number("year", 2010.0)?, number("month", 7.0)?, number("day", 10.0)?);
+    let (timezone, year, month, day) =
+        (number("timezone", 9.0)?, number("year", 2010.0)?, number("month", 7.0)?, number("day", 10.0)?);
     let hours = number("hour", 15.0)? + number("minute", 0.0)? / 60.0 + number("second", 0.0)? / 3600.0 - timezone;
     if let Some(direction) = given {
         let direction = DVec3::from(direction).try_normalize();
@@ -92,7 +94,10 @@ fn days_since_2000(year: f64, month: f64, day: f64, hours: f64) -> f64 {
     let months = 12.0 * year + month - 3.0;
     // Years that begin in March have the leap day at their end.
     let (y, m) = ((months / 12.0).floor(), months - 12.0 * (months / 12.0).floor());
-    let days = 365.0 * y + (y / 4.0).floor() - (y / 100.0).floor() + (y / 400.0).floor() + ((153.0 * m + 2.0) / 5.0).floor() + day;
+    let days = 365.0 * y + (y / 4.0).floor() - (y / 100.0).floor()
+        + (y / 400.0).floor()
+        + ((153.0 * m + 2.0) / 5.0).floor()
+        + day;
     days - 730_426.0 + hours / 24.0 - 0.5
 }
 
@@ -155,9 +160,27 @@ impl Preetham {
     fn new(turbidity: f64, theta: f64) -> Self {
         let t = turbidity;
         let coefficients = [
-            [0.1787 * t - 1.4630, -0.3554 * t + 0.4275, -0.0227 * t + 5.3251, 0.1206 * t - 2.5771, -0.0670 * t + 0.3703],
-            [-0.0193 * t - 0.2592, -0.0665 * t + 0.0008, -0.0004 * t + 0.2125, -0.0641 * t - 0.8989, -0.0033 * t + 0.0452],
-            [-0.0167 * t - 0.2608, -0.0950 * t + 0.0092, -0.0079 * t + 0.2102, -0.0441 * t - 1.6537, -0.0109 * t + 0.0529],
+            [
+                0.1787 * t - 1.4630,
+                -0.3554 * t + 0.4275,
+                -0.0227 * t + 5.3251,
+                0.1206 * t - 2.5771,
+                -0.0670 * t + 0.3703,
+            ],
+            [
+                -0.0193 * t - 0.2592,
+                -0.0665 * t + 0.0008,
+                -0.0004 * t + 0.2125,
+                -0.0641 * t - 0.8989,
+                -0.0033 * t + 0.0452,
+            ],
+            [
+                -0.0167 * t - 0.2608,
+                -0.0950 * t + 0.0092,
+                -0.0079 * t + 0.2102,
+                -0.0441 * t - 1.6537,
+                -0.0109 * t + 0.0529,
+            ],
         ];
         let chi = (4.0 / 9.0 - t / 120.0) * (PI - 2.0 * theta);
         let polynomial = |rows: [[f64; 4]; 3]| -> f64 {
@@ -167,8 +190,16 @@ impl Preetham {
         };
         let zenith = [
             (4.0453 * t - 4.9710) * chi.tan() - 0.2155 * t + 2.4192,
-            polynomial([[0.00166, -0.00375, 0.00209, 0.0], [-0.02903, 0.06377, -0.03202, 0.00394], [0.11693, -0.21196, 0.06052, 0.25886]]),
-            polynomial([[0.00275, -0.00610, 0.00317, 0.0], [-0.04214, 0.08970, -0.04153, 0.00516], [0.15346, -0.26756, 0.06670, 0.26688]]),
+            polynomial([
+                [0.00166, -0.00375, 0.00209, 0.0],
+                [-0.02903, 0.06377, -0.03202, 0.00394],
+                [0.11693, -0.21196, 0.06052, 0.25886],
+            ]),
+            polynomial([
+                [0.00275, -0.00610, 0.00317, 0.0],
+                [-0.04214, 0.08970, -0.04153, 0.00516],
+                [0.15346, -0.26756, 0.06670, 0.26688],
+            ]),
         ];
         let factors = std::array::from_fn(|i| zenith[i] / perez(&coefficients[i], 1.0, theta));
         Self { coefficients, factors }
@@ -176,7 +207,8 @@ impl Preetham {
 
     /// Linear RGB at a cosine from the zenith and an angle from the sun.
     fn radiance(&self, cosine: f64, gamma: f64) -> [f64; 3] {
-        let [luminance, x, y] = std::array::from_fn(|i| self.factors[i] * perez(&self.coefficients[i], cosine.max(0.01), gamma));
+        let [luminance, x, y] =
+            std::array::from_fn(|i| self.factors[i] * perez(&self.coefficients[i], cosine.max(0.01), gamma));
         // Kilocandela per square metre in watts per square metre, steradian and nanometre.
         let luminance = luminance * BRIGHTNESS * 1000.0 / (683.0 * 106.856);
         let (cx, cz) = (luminance * x / y, luminance * (1.0 - x - y) / y);

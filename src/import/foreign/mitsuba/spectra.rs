@@ -17,11 +17,18 @@ impl<'a> Reader<'a> {
             Spectrum::Uniform(value) => spectrum::Spectrum::Constant(*value),
             Spectrum::Samples(samples) => sampled(samples.clone(), place)?,
             Spectrum::File(name) => {
-                let path = self.scene.parent().unwrap_or(std::path::Path::new("")).join(self.document.find_file(self.scene, name));
+                let path = self
+                    .scene
+                    .parent()
+                    .unwrap_or(std::path::Path::new(""))
+                    .join(self.document.find_file(self.scene, name));
                 let text = crate::file::read_to_string(&path)
                     .map_err(|e| Error::Missing { file: path.clone(), message: format!("{e} (named at {place})") })?;
                 self.draft.files.insert(path.clone());
-                sampled(file_samples(&text).map_err(|message| place.error(format!("{}: {message}", path.display())))?, place)?
+                sampled(
+                    file_samples(&text).map_err(|message| place.error(format!("{}: {message}", path.display())))?,
+                    place,
+                )?
             }
         };
         Ok(color(&spectrum, emitted))
@@ -40,8 +47,9 @@ impl<'a> Reader<'a> {
                 return Ok(constant_color(element, "color", [1.0; 3])?.map(|c| c * scale));
             }
             "regular" => {
-                let needed =
-                    |value: Option<f64>, name: &str| value.ok_or_else(|| place.error(format!("a regular spectrum needs \"{name}\"")));
+                let needed = |value: Option<f64>, name: &str| {
+                    value.ok_or_else(|| place.error(format!("a regular spectrum needs \"{name}\"")))
+                };
                 let first = needed(element.float("wavelength_min")?, "wavelength_min")?;
                 let last = needed(element.float("wavelength_max")?, "wavelength_max")?;
                 let values = list(element, "values")?;
@@ -55,9 +63,12 @@ impl<'a> Reader<'a> {
                 sampled(wavelengths.into_iter().zip(values).map(|(x, y)| [x, y]).collect(), place)?
             }
             "blackbody" => {
-                let kelvin = element.float("temperature")?.ok_or_else(|| place.error("a blackbody needs \"temperature\""))?;
+                let kelvin =
+                    element.float("temperature")?.ok_or_else(|| place.error("a blackbody needs \"temperature\""))?;
                 if kelvin <= 0.0 {
-                    return Err(element.place_of("temperature").error(format!("\"temperature\" must be above 0, not {kelvin}")));
+                    return Err(element
+                        .place_of("temperature")
+                        .error(format!("\"temperature\" must be above 0, not {kelvin}")));
                 }
                 let scale = element.float("scale")?.unwrap_or(1.0);
                 let peak = peak_radiance(kelvin) * scale;

@@ -7,7 +7,10 @@ use super::Reader;
 use super::element::Element;
 use super::tree::{PluginId, Property, Value};
 use crate::attribute::is_of_faces;
-use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, RangedDesc, ScalarDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
+use crate::desc::{
+    ChannelDesc, ColorDesc, ColorSpaceDesc, RangedDesc, ScalarDesc, TextureDesc, TextureFilterDesc, WrapDesc,
+    WrapModeDesc,
+};
 use crate::error::Result;
 use crate::image_data::{ImageData, Samples};
 use crate::math::{DAffine3, DMat3, DVec3, dvec3};
@@ -42,7 +45,8 @@ pub enum TextureValue {
 }
 
 /// How to mirror v.
-const MIRROR: DAffine3 = DAffine3 { matrix3: DMat3 { x_axis: DVec3::X, y_axis: DVec3::NEG_Y, z_axis: DVec3::Z }, translation: DVec3::Y };
+const MIRROR: DAffine3 =
+    DAffine3 { matrix3: DMat3 { x_axis: DVec3::X, y_axis: DVec3::NEG_Y, z_axis: DVec3::Z }, translation: DVec3::Y };
 
 impl UvOrigin {
     /// Mitsuba's uv from Steradian's.
@@ -50,7 +54,9 @@ impl UvOrigin {
         match self {
             Self::Mitsuba => DAffine3::IDENTITY,
             Self::Upward => MIRROR,
-            Self::Swapped => DAffine3 { matrix3: DMat3::from_cols(DVec3::Y, DVec3::X, DVec3::Z), translation: DVec3::ZERO },
+            Self::Swapped => {
+                DAffine3 { matrix3: DMat3::from_cols(DVec3::Y, DVec3::X, DVec3::Z), translation: DVec3::ZERO }
+            }
         }
     }
 }
@@ -67,7 +73,13 @@ pub fn plain(color: [f32; 3]) -> ColorDesc {
 
 impl<'a> Reader<'a> {
     /// A colour of a surface by name.
-    pub(super) fn color(&mut self, element: &mut Element<'a>, name: &str, default: f32, uv: UvOrigin) -> Result<ColorDesc> {
+    pub(super) fn color(
+        &mut self,
+        element: &mut Element<'a>,
+        name: &str,
+        default: f32,
+        uv: UvOrigin,
+    ) -> Result<ColorDesc> {
         let Some(property) = element.take(name) else {
             return Ok(ColorDesc::Grey(default));
         };
@@ -78,7 +90,14 @@ impl<'a> Reader<'a> {
     }
 
     /// A number of a surface by name, times `factor`.
-    pub(super) fn scalar(&mut self, element: &mut Element<'a>, name: &str, default: f32, factor: f32, uv: UvOrigin) -> Result<ScalarDesc> {
+    pub(super) fn scalar(
+        &mut self,
+        element: &mut Element<'a>,
+        name: &str,
+        default: f32,
+        factor: f32,
+        uv: UvOrigin,
+    ) -> Result<ScalarDesc> {
         let Some(property) = element.take(name) else {
             return Ok(ScalarDesc::Constant(default * factor));
         };
@@ -87,11 +106,13 @@ impl<'a> Reader<'a> {
             TextureValue::Named(texture) if factor == 1.0 => ScalarDesc::Texture { texture },
             TextureValue::Named(texture) => {
                 let grey = |color: [f32; 3]| color.map(|c| c * factor);
-                let product =
-                    || TextureDesc::Product { factors: vec![ColorDesc::Grey(factor), ColorDesc::Texture { texture: texture.clone() }] };
+                let product = || TextureDesc::Product {
+                    factors: vec![ColorDesc::Grey(factor), ColorDesc::Texture { texture: texture.clone() }],
+                };
                 let (scaled, is_usable) = match self.draft.desc.textures.get(&texture) {
                     Some(TextureDesc::Checker { color0, color1, scale }) => {
-                        let scaled = TextureDesc::Checker { color0: grey(*color0), color1: grey(*color1), scale: *scale };
+                        let scaled =
+                            TextureDesc::Checker { color0: grey(*color0), color1: grey(*color1), scale: *scale };
                         (scaled, [color0, color1].iter().all(|color| color.iter().all(|&c| c <= 1.0)))
                     }
                     _ => (product(), true),
@@ -135,7 +156,11 @@ impl<'a> Reader<'a> {
             Value::Integer(v) => [*v as f32; 3],
             Value::Rgb(color) => *color,
             Value::Spectrum(spectrum) => self.spectrum_color(spectrum, &property.place, false)?,
-            _ => return Err(property.place.error(format!("\"{}\" must be a colour, a number or a texture", property.name))),
+            _ => {
+                return Err(property
+                    .place
+                    .error(format!("\"{}\" must be a colour, a number or a texture", property.name)));
+            }
         }))
     }
 
@@ -169,7 +194,8 @@ impl<'a> Reader<'a> {
 
     /// An attribute of meshes. Whether a mesh has it is found when the scene is compiled.
     fn mesh_attribute(&mut self, element: &mut Element<'a>) -> Result<TextureValue> {
-        let attribute = element.text("name")?.ok_or_else(|| element.place().error("a mesh_attribute needs \"name\""))?;
+        let attribute =
+            element.text("name")?.ok_or_else(|| element.place().error("a mesh_attribute needs \"name\""))?;
         if is_of_faces(attribute).is_none() {
             return Err(element
                 .place_of("name")
@@ -177,7 +203,9 @@ impl<'a> Reader<'a> {
         }
         let scale = element.float("scale")?.unwrap_or(1.0) as f32;
         if !(scale.is_finite() && scale >= 0.0) {
-            return Err(element.place_of("scale").error(format!("\"scale\" must be finite and not below 0, not {scale}")));
+            return Err(element
+                .place_of("scale")
+                .error(format!("\"scale\" must be finite and not below 0, not {scale}")));
         }
         let name = if element.plugin.id.is_empty() { attribute } else { &element.plugin.id };
         let texture = TextureDesc::MeshAttribute { name: attribute.into(), scale };
@@ -191,13 +219,21 @@ impl<'a> Reader<'a> {
         let filter = match element.text("filter_type")?.unwrap_or("bilinear") {
             "nearest" => TextureFilterDesc::Nearest,
             "bilinear" => TextureFilterDesc::Bilinear,
-            other => return Err(element.place_of("filter_type").error(format!("\"{other}\" is neither bilinear nor nearest"))),
+            other => {
+                return Err(element
+                    .place_of("filter_type")
+                    .error(format!("\"{other}\" is neither bilinear nor nearest")));
+            }
         };
         let wrap = match element.text("wrap_mode")?.unwrap_or("repeat") {
             "repeat" => WrapModeDesc::Repeat,
             "mirror" => WrapModeDesc::Mirror,
             "clamp" => WrapModeDesc::Clamp,
-            other => return Err(element.place_of("wrap_mode").error(format!("\"{other}\" is neither repeat, mirror nor clamp"))),
+            other => {
+                return Err(element
+                    .place_of("wrap_mode")
+                    .error(format!("\"{other}\" is neither repeat, mirror nor clamp")));
+            }
         };
         // How Mitsuba keeps it in memory, not what it looks like.
         element.text("format")?;

@@ -38,9 +38,14 @@ fn step(node: Node, read: Read, fail: Fail) -> Result<DAffine3> {
             values::rotation(axis.into(), values::number(&angle).map_err(at)?).map_err(at)?
         }
         "lookat" | "lookAt" => {
-            let mut point = |name: &str| read(node, name)?.map(|text| values::vector(&text).map(DVec3::from).map_err(at)).transpose();
-            let needed = |point: Option<DVec3>, name: &str| point.ok_or_else(|| at(format!("<lookat> needs the attribute \"{name}\"")));
-            let (origin, target, up) = (needed(point("origin")?, "origin")?, needed(point("target")?, "target")?, point("up")?);
+            let mut point = |name: &str| {
+                read(node, name)?.map(|text| values::vector(&text).map(DVec3::from).map_err(at)).transpose()
+            };
+            let needed = |point: Option<DVec3>, name: &str| {
+                point.ok_or_else(|| at(format!("<lookat> needs the attribute \"{name}\"")))
+            };
+            let (origin, target, up) =
+                (needed(point("origin")?, "origin")?, needed(point("target")?, "target")?, point("up")?);
             values::look_at(origin, target, up).map_err(at)?
         }
         "matrix" => {

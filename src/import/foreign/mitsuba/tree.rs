@@ -102,7 +102,11 @@ pub struct Plugin {
 impl Plugin {
     /// How reports call it.
     pub fn title(&self) -> String {
-        if self.id.is_empty() { format!("{} {}", self.class, self.kind) } else { format!("{} {} \"{}\"", self.class, self.kind, self.id) }
+        if self.id.is_empty() {
+            format!("{} {}", self.class, self.kind)
+        } else {
+            format!("{} {} \"{}\"", self.class, self.kind, self.id)
+        }
     }
 }
 

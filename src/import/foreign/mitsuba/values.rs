@@ -48,7 +48,8 @@ pub fn rgb(text: &str) -> Result<[f32; 3], Fault> {
 pub fn samples(text: &str) -> Result<Vec<[f64; 2]>, Fault> {
     let mut samples = Vec::new();
     for part in text.split([',', ' ', '\t', '\n', '\r']).filter(|part| !part.is_empty()) {
-        let (wavelength, value) = part.split_once(':').ok_or_else(|| format!("\"{}\" is not wavelength:value", shortened(part)))?;
+        let (wavelength, value) =
+            part.split_once(':').ok_or_else(|| format!("\"{}\" is not wavelength:value", shortened(part)))?;
         samples.push([number(wavelength)?, number(value)?]);
     }
     if !samples.windows(2).all(|pair| pair[0][0] < pair[1][0]) {

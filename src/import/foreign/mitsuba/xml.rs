@@ -26,8 +26,21 @@ const MAX_FILES: usize = 1000;
 const MAX_ATTRIBUTES: usize = 100;
 
 /// Tags of plugins.
-const CLASSES: [&str; 13] =
-    ["scene", "integrator", "sensor", "film", "sampler", "rfilter", "bsdf", "emitter", "shape", "texture", "volume", "medium", "phase"];
+const CLASSES: [&str; 13] = [
+    "scene",
+    "integrator",
+    "sensor",
+    "film",
+    "sampler",
+    "rfilter",
+    "bsdf",
+    "emitter",
+    "shape",
+    "texture",
+    "volume",
+    "medium",
+    "phase",
+];
 
 /// Tags of parameters and of what is not a plugin.
 const OTHERS: [&str; 14] = [
@@ -173,13 +186,15 @@ impl Parser {
         let options = ParsingOptions { nodes_limit, ..ParsingOptions::default() };
         let xml = Xml::parse_with_options(text.trim_start_matches('\u{feff}'), options).map_err(|e| {
             let at = e.pos();
-            Place { file: Rc::clone(&file), line: at.row as usize, column: at.col as usize }.error(format!("not valid XML: {e}"))
+            Place { file: Rc::clone(&file), line: at.row as usize, column: at.col as usize }
+                .error(format!("not valid XML: {e}"))
         })?;
         let starts = xml.input_text().bytes().enumerate().filter(|(_, b)| *b == b'\n').map(|(i, _)| i + 1);
         let lines = std::iter::once(0).chain(starts).collect();
         let root = xml.root_element();
         let version = root.attribute("version").unwrap_or("3.0.0");
-        let camel_case = version.split('.').next().is_some_and(|major| matches!(major.trim().parse::<u32>(), Ok(0 | 1)));
+        let camel_case =
+            version.split('.').next().is_some_and(|major| matches!(major.trim().parse::<u32>(), Ok(0 | 1)));
         let source = XmlFile { path: file, lines, camel_case };
         if root.tag_name().name() != "scene" {
             return Err(source.place(root).error(format!("expected <scene>, found <{}>", root.tag_name().name())));
@@ -203,7 +218,8 @@ impl Parser {
     }
 
     fn needed(&mut self, source: &XmlFile, node: Node, name: &str) -> Result<String> {
-        let missing = || source.place(node).error(format!("<{}> needs the attribute \"{name}\"", node.tag_name().name()));
+        let missing =
+            || source.place(node).error(format!("<{}> needs the attribute \"{name}\"", node.tag_name().name()));
         self.attribute(source, node, name)?.ok_or_else(missing)
     }
 
@@ -261,7 +277,14 @@ impl Parser {
         Ok(Plugin { class: class.into(), kind, id, place, properties })
     }
 
-    fn child(&mut self, source: &XmlFile, node: Node, outer: &str, properties: &mut Vec<Property>, depth: usize) -> Result<()> {
+    fn child(
+        &mut self,
+        source: &XmlFile,
+        node: Node,
+        outer: &str,
+        properties: &mut Vec<Property>,
+        depth: usize,
+    ) -> Result<()> {
         let tag = node.tag_name().name();
         let place = source.place(node);
         match tag {
@@ -311,7 +334,9 @@ impl Parser {
             "ref" => Value::Reference(self.needed(source, node, "id")?),
             "transform" => {
                 let mut read = |node: Node, name: &str| self.attribute(source, node, name);
-                Value::Transform(transforms::compose(node, &mut read, &|node, message| source.place(node).error(message))?)
+                Value::Transform(transforms::compose(node, &mut read, &|node, message| {
+                    source.place(node).error(message)
+                })?)
             }
             "vector" | "point" => Value::Vector(self.vector(source, node)?),
             "spectrum" if node.attribute("value").is_some() => {
@@ -323,7 +348,9 @@ impl Parser {
                     Spectrum::Uniform(values::number(&text).map_err(fault)?)
                 })
             }
-            "spectrum" if node.attribute("filename").is_some() => Value::Spectrum(Spectrum::File(self.needed(source, node, "filename")?)),
+            "spectrum" if node.attribute("filename").is_some() => {
+                Value::Spectrum(Spectrum::File(self.needed(source, node, "filename")?))
+            }
             "float" => Value::Float(values::number(&self.needed(source, node, "value")?).map_err(fault)?),
             "integer" => Value::Integer(values::integer(&self.needed(source, node, "value")?).map_err(fault)?),
             "boolean" => Value::Boolean(values::boolean(&self.needed(source, node, "value")?).map_err(fault)?),
@@ -334,7 +361,14 @@ impl Parser {
     }
 
     /// A plugin in a plugin.
-    fn nested(&mut self, source: &XmlFile, node: Node, name: String, properties: &mut Vec<Property>, depth: usize) -> Result<()> {
+    fn nested(
+        &mut self,
+        source: &XmlFile,
+        node: Node,
+        name: String,
+        properties: &mut Vec<Property>,
+        depth: usize,
+    ) -> Result<()> {
         let place = source.place(node);
         let kind = self.needed(source, node, "type")?;
         names::check(node.tag_name().name(), &kind).map_err(|message| place.error(message))?;

@@ -40,7 +40,11 @@ impl Patches {
 
     /// As triangles, and how many patches are curved.
     pub fn triangulate(&self) -> (MeshData, usize) {
-        let mut mesh = MeshData { normals: self.normals.as_ref().map(|_| Vec::new()), uvs: Some(Vec::new()), ..MeshData::default() };
+        let mut mesh = MeshData {
+            normals: self.normals.as_ref().map(|_| Vec::new()),
+            uvs: Some(Vec::new()),
+            ..MeshData::default()
+        };
         let curved = self.corners.iter().filter(|corners| !self.is_flat(**corners)).count();
         let grid = ((MANY / 2 / curved.max(1)) as f64).sqrt().clamp(2.0, f64::from(GRID)) as u32;
         for &corners in &self.corners {

@@ -78,34 +78,44 @@ fn pbrt_from_ours(kind: &str) -> DMat3 {
     }
 }
 
+/// Sets a perspective projection; `scale` is that of the camera's transformation.
+fn set_perspective(camera: &mut CameraDesc, params: &Params, size: [u32; 2], scale: f64) -> Result<()> {
+    let screen = Screen::read(params, size)?;
+    let fov = params.number_or("fov", 90.0)?;
+    if !(fov > 0.0 && fov < 180.0) {
+        return Err(params.error(format!("fov must be above 0 and below 180 degrees, not {fov}")));
+    }
+    let half_height = (0.5 * fov.to_radians()).tan() * 0.5 * screen.size(1);
+    camera.vertical_fov_degrees = Some(2.0 * half_height.atan().to_degrees());
+    screen.frame(camera, size);
+    let radius = params.number_or("lensradius", 0.0)?;
+    let focus = params.positive_or("focaldistance", 1e6)?;
+    if radius > 0.0 {
+        camera.lens = Some(LensDesc {
+            radius: Some(radius * scale),
+            f_number: None,
+            focal_length: None,
+            focus_distance: Some(focus * scale),
+            focus_point: None,
+            sensor_distance: None,
+            sensor_height: None,
+            blades: None,
+        });
+    }
+    Ok(())
+}
+
 /// Sets the projection of a camera; `scale` is that of its transformation.
-fn set_projection(draft: &mut Draft, camera: &mut CameraDesc, directive: &CameraDirective, size: [u32; 2], scale: f64) -> Result<()> {
+fn set_projection(
+    draft: &mut Draft,
+    camera: &mut CameraDesc,
+    directive: &CameraDirective,
+    size: [u32; 2],
+    scale: f64,
+) -> Result<()> {
     let params = &directive.params;
     match directive.kind.as_str() {
-        "perspective" => {
-            let screen = Screen::read(params, size)?;
-            let fov = params.number_or("fov", 90.0)?;
-            if !(fov > 0.0 && fov < 180.0) {
-                return Err(params.error(format!("fov must be above 0 and below 180 degrees, not {fov}")));
-            }
-            let half_height = (0.5 * fov.to_radians()).tan() * 0.5 * screen.size(1);
-            camera.vertical_fov_degrees = Some(2.0 * half_height.atan().to_degrees());
-            screen.frame(camera, size);
-            let radius = params.number_or("lensradius", 0.0)?;
-            let focus = params.positive_or("focaldistance", 1e6)?;
-            if radius > 0.0 {
-                camera.lens = Some(LensDesc {
-                    radius: Some(radius * scale),
-                    f_number: None,
-                    focal_length: None,
-                    focus_distance: Some(focus * scale),
-                    focus_point: None,
-                    sensor_distance: None,
-                    sensor_height: None,
-                    blades: None,
-                });
-            }
-        }
+        "perspective" => set_perspective(camera, params, size, scale)?,
         "orthographic" => {
             let screen = Screen::read(params, size)?;
             camera.kind = CameraKindDesc::Orthographic;

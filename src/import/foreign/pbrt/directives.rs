@@ -91,8 +91,8 @@ impl Reader {
 
     /// Reads all of it.
     pub fn read(mut self) -> Result<Imported> {
-        let bytes =
-            crate::file::read_stream(&self.scene).map_err(|e| Error::Missing { file: self.scene.clone(), message: e.to_string() })?;
+        let bytes = crate::file::read_stream(&self.scene)
+            .map_err(|e| Error::Missing { file: self.scene.clone(), message: e.to_string() })?;
         self.lexers.push(Lexer::new(self.scene.clone(), bytes));
         let mut last = None;
         while let Some(mut lexer) = self.lexers.pop() {
@@ -101,7 +101,9 @@ impl Reader {
                 continue;
             };
             if token.kind != TokenKind::Word {
-                return Err(lexer.error(token.at, format!("expected a directive such as Shape, not {}", lexer.text(&token))));
+                return Err(
+                    lexer.error(token.at, format!("expected a directive such as Shape, not {}", lexer.text(&token)))
+                );
             }
             let directive = lexer.text(&token).to_owned();
             let included = self.directive(&mut lexer, token.at, &directive)?;
@@ -156,8 +158,9 @@ impl Reader {
             "CoordSysTransform" => {
                 let name = quoted(lexer, at, "a name")?;
                 let known = self.coordinate_systems.get(&name);
-                self.graphics.ctm =
-                    *known.ok_or_else(|| lexer.error(at, format!("CoordSysTransform: no coordinate system named \"{name}\"")))?;
+                self.graphics.ctm = *known.ok_or_else(|| {
+                    lexer.error(at, format!("CoordSysTransform: no coordinate system named \"{name}\""))
+                })?;
             }
             "ReverseOrientation" => self.graphics.reverse_orientation = !self.graphics.reverse_orientation,
             "ActiveTransform" => {
@@ -173,7 +176,8 @@ impl Reader {
             "ColorSpace" => {
                 let name = quoted(lexer, at, "a colour space")?;
                 let space = ColorSpace::named(&name);
-                self.graphics.color_space = space.ok_or_else(|| lexer.error(at, format!("there is no colour space \"{name}\"")))?;
+                self.graphics.color_space =
+                    space.ok_or_else(|| lexer.error(at, format!("there is no colour space \"{name}\"")))?;
             }
             _ => return Ok(false),
         }
@@ -200,7 +204,9 @@ impl Reader {
                 let params = self.params(lexer, at, "Option".into())?;
                 self.draft.ignored(&params.place, "Option", "", "options are those of the command line");
             }
-            "Film" | "PixelFilter" | "Sampler" | "Integrator" | "Accelerator" | "Camera" => self.option(lexer, at, directive)?,
+            "Film" | "PixelFilter" | "Sampler" | "Integrator" | "Accelerator" | "Camera" => {
+                self.option(lexer, at, directive)?;
+            }
             "ObjectBegin" | "ObjectEnd" | "ObjectInstance" => self.object(lexer, at, directive)?,
             "MediumInterface" => {
                 quoted(lexer, at, "a medium")?;
@@ -263,8 +269,10 @@ impl Reader {
         if name.ends_with(".gz") {
             return Err(lexer.error(at, format!("\"{name}\": compressed files are not read")));
         }
-        let bytes = crate::file::read(&file)
-            .map_err(|e| Error::Missing { file: file.clone(), message: format!("{e} (included by {})", lexer.place(at)) })?;
+        let bytes = crate::file::read(&file).map_err(|e| Error::Missing {
+            file: file.clone(),
+            message: format!("{e} (included by {})", lexer.place(at)),
+        })?;
         self.draft.files.insert(file.clone());
         Ok(Lexer::new(file, bytes))
     }
@@ -314,7 +322,8 @@ impl Reader {
         }
         let get = |key: &str| self.options.get(key);
         let draft = &mut self.draft;
-        self.exposure = options::exposure(get("Film"), camera::shutter(self.camera.as_ref().map(|camera| &camera.params))?)?;
+        self.exposure =
+            options::exposure(get("Film"), camera::shutter(self.camera.as_ref().map(|camera| &camera.params))?)?;
         options::set_film(draft, get("Film"))?;
         options::set_filter(draft, get("PixelFilter"))?;
         options::set_sampler(draft, get("Sampler"))?;
@@ -382,7 +391,8 @@ impl Reader {
         if directive == "NamedMaterial" {
             let known = self.materials.get(&first).cloned();
             self.graphics.material = Some(known.ok_or_else(|| {
-                let hint = crate::suggestion::did_you_mean(&first, self.materials.keys().map(String::as_str), ["\"", "\""]);
+                let hint =
+                    crate::suggestion::did_you_mean(&first, self.materials.keys().map(String::as_str), ["\"", "\""]);
                 lexer.error(at, format!("no material named \"{first}\"{hint}"))
             })?);
             return Ok(());
@@ -429,7 +439,9 @@ impl Reader {
         let ours = materials.add(name, kind, params, |name| known(name).map(|material| material.name))?;
         Ok(ShapeMaterial::Material(Material {
             name: ours,
-            is_textured: params.names_textures() || params.has("normalmap") || parts.iter().any(|part| part.is_textured),
+            is_textured: params.names_textures()
+                || params.has("normalmap")
+                || parts.iter().any(|part| part.is_textured),
             has_inside: kind == "dielectric" || parts.iter().any(|part| part.has_inside),
         }))
     }

@@ -54,7 +54,11 @@ impl Lights<'_> {
         let light = match kind {
             "point" => {
                 let intensity = self.emitted(params, "I", 4.0 * std::f64::consts::PI)?;
-                LightDesc::Point(PointLightDesc { position: point("from", [0.0; 3])?.to_array(), intensity, group: None })
+                LightDesc::Point(PointLightDesc {
+                    position: point("from", [0.0; 3])?.to_array(),
+                    intensity,
+                    group: None,
+                })
             }
             "goniometric" => {
                 params.ignore("filename", "the same intensity in all directions");
@@ -110,13 +114,15 @@ impl Lights<'_> {
             return Ok(light);
         };
         let asset = self.colors.folder.join(file);
-        let image =
-            read_rgb_image(&asset).map_err(|error| error.at(self.scene, &format!("{}: {}", params.place, params.element), &asset))?;
+        let image = read_rgb_image(&asset)
+            .map_err(|error| error.at(self.scene, &format!("{}: {}", params.place, params.element), &asset))?;
         if let Some(lux) = lux {
             let found = octahedral::illuminance(&image);
             scale *= if found > 0.0 { lux / found } else { 1.0 };
         }
-        let Some((rotation, _)) = rotation_and_scale(map) else { return Err(params.error("the transform is singular")) };
+        let Some((rotation, _)) = rotation_and_scale(map) else {
+            return Err(params.error("the transform is singular"));
+        };
         // A mirror goes into the image: environments are rotated only.
         let mirrored = rotation.determinant() < 0.0;
         let pbrt_from_ours = DMat3::from_cols(
@@ -143,7 +149,10 @@ impl Lights<'_> {
         params.approximate("filename", "a lat-long image with z up");
         let (width, height) = (image.width, image.height);
         let pixel = |i: usize| {
-            let d = octahedral::pbrt_from_ours(octahedral::direction(((i % width) as f64 + 0.5) / width as f64, 0.5), mirrored);
+            let d = octahedral::pbrt_from_ours(
+                octahedral::direction(((i % width) as f64 + 0.5) / width as f64, 0.5),
+                mirrored,
+            );
             let share = (d.y.atan2(d.x) / std::f64::consts::TAU).rem_euclid(1.0);
             let column = ((share * width as f64) as usize).min(width - 1);
             image.pixels.get((i / width) * width + column).copied().unwrap_or_default()

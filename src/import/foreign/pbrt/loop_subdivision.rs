@@ -51,7 +51,8 @@ impl Surface {
                 let followers = next.get_mut(v as usize).ok_or("an index is not that of a vertex")?;
                 if v == from || v == to || from == to || followers.insert(from, to).is_some() {
                     return Err(format!(
-                        "the mesh is no surface at vertex {v}: an edge has more than two triangles, or they are wound differently"
+                        "the mesh is no surface at vertex {v}: an edge has more than two triangles, or they are wound \
+                         differently"
                     ));
                 }
             }
@@ -98,7 +99,9 @@ impl Surface {
         let (p, ring) = (self.positions[vertex], &self.rings[vertex]);
         match ring.around.as_slice() {
             [] => p,
-            [first, .., last] if ring.is_boundary => p * (1.0 - 2.0 * boundary) + (self.at(*first) + self.at(*last)) * boundary,
+            [first, .., last] if ring.is_boundary => {
+                p * (1.0 - 2.0 * boundary) + (self.at(*first) + self.at(*last)) * boundary
+            }
             around => {
                 let beta = beta(around.len());
                 p * (1.0 - around.len() as f64 * beta) + around.iter().map(|&i| self.at(i)).sum::<DVec3>() * beta
@@ -116,7 +119,8 @@ impl Surface {
         let gamma = |valence: usize| 1.0 / (valence as f64 + 3.0 / (8.0 * beta(valence)));
         let limits: Vec<DVec3> = (0..self.positions.len()).map(|v| self.weighted(v, gamma, 1.0 / 5.0)).collect();
         let on_limit = Self { positions: limits, triangles: Vec::new(), rings: Vec::new() };
-        let normals = self.rings.iter().enumerate().map(|(v, ring)| on_limit.normal(v, ring).as_vec3().to_array()).collect();
+        let normals =
+            self.rings.iter().enumerate().map(|(v, ring)| on_limit.normal(v, ring).as_vec3().to_array()).collect();
         let positions = on_limit.positions.iter().map(|p| p.as_vec3().to_array()).collect();
         MeshData { positions, triangles: self.triangles.clone(), normals: Some(normals), ..MeshData::default() }
     }
@@ -139,7 +143,9 @@ impl Surface {
                 _ => {
                     let theta = PI / (n - 1) as f64;
                     let ends = (ring_at(0) + ring_at(n - 1)) * theta.sin();
-                    let inner = (1..n - 1).map(|i| ring_at(i) * ((2.0 * theta.cos() - 2.0) * (i as f64 * theta).sin())).sum::<DVec3>();
+                    let inner = (1..n - 1)
+                        .map(|i| ring_at(i) * ((2.0 * theta.cos() - 2.0) * (i as f64 * theta).sin()))
+                        .sum::<DVec3>();
                     -(ends + inner)
                 }
             };
@@ -152,7 +158,9 @@ impl Surface {
 
 impl Ring {
     fn new(vertex: usize, followers: &HashMap<u32, u32>) -> Result<Self, String> {
-        let Some((&any, _)) = followers.iter().min() else { return Ok(Self { around: Vec::new(), is_boundary: false }) };
+        let Some((&any, _)) = followers.iter().min() else {
+            return Ok(Self { around: Vec::new(), is_boundary: false });
+        };
         // A boundary begins with the neighbour that follows no other.
         let targets: std::collections::HashSet<u32> = followers.values().copied().collect();
         let start = followers.keys().copied().filter(|from| !targets.contains(from)).min();

@@ -4,8 +4,8 @@ use super::colors::{Colors, Meaning};
 use super::params::Params;
 use super::textures::{Texture, Textures};
 use crate::desc::{
-    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, PlasticDesc, RangedDesc,
-    RoughnessDesc, TextureDesc, TextureFilterDesc, WrapDesc,
+    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, PlasticDesc,
+    RangedDesc, RoughnessDesc, TextureDesc, TextureFilterDesc, WrapDesc,
 };
 use crate::error::Result;
 use crate::import::foreign::Draft;
@@ -28,14 +28,26 @@ pub struct Materials<'a> {
 impl Materials<'_> {
     /// Adds a material of a kind under a name like `name`; the result is its name. `find` gives materials by pbrt's
     /// names.
-    pub fn add(&mut self, name: &str, kind: &str, params: &Params, find: impl Fn(&str) -> Option<String>) -> Result<String> {
+    pub fn add(
+        &mut self,
+        name: &str,
+        kind: &str,
+        params: &Params,
+        find: impl Fn(&str) -> Option<String>,
+    ) -> Result<String> {
         let desc = self.desc(name, kind, params, find)?;
         let desc = self.with_relief(name, params, desc)?;
         params.report(self.draft);
         Ok(self.draft.add_material(name, &params.place, desc))
     }
 
-    fn desc(&mut self, name: &str, kind: &str, params: &Params, find: impl Fn(&str) -> Option<String>) -> Result<MaterialDesc> {
+    fn desc(
+        &mut self,
+        name: &str,
+        kind: &str,
+        params: &Params,
+        find: impl Fn(&str) -> Option<String>,
+    ) -> Result<MaterialDesc> {
         Ok(match kind {
             "diffuse" => MaterialDesc::Diffuse { albedo: self.color(params, "reflectance", 0.5)?, roughness: zero() },
             "coateddiffuse" => {
@@ -44,21 +56,7 @@ impl Materials<'_> {
             }
             "conductor" => self.conductor(params, "", 0.0, 1.0)?,
             "coatedconductor" => self.coated_conductor(name, params)?,
-            "dielectric" => {
-                let (ior, abbe) = self.colors.index(params, "eta", 1.5)?;
-                MaterialDesc::Dielectric(Box::new(DielectricDesc {
-                    ior: RangedDesc::Constant(ior.clamp(0.1, 10.0)),
-                    roughness: None,
-                    alpha: self.alpha(params, "", 0.0)?,
-                    distribution: DistributionDesc::default(),
-                    multiscatter: false,
-                    reflection_tint: ColorDesc::Grey(1.0),
-                    transmission_tint: ColorDesc::Grey(1.0),
-                    priority: None,
-                    absorption: None,
-                    abbe,
-                }))
-            }
+            "dielectric" => self.dielectric(params)?,
             "thindielectric" => {
                 let (ior, _) = self.colors.index(params, "eta", 1.5)?;
                 MaterialDesc::ThinDielectric {
@@ -69,19 +67,8 @@ impl Materials<'_> {
             }
             "diffusetransmission" => self.diffuse_transmission(params)?,
             "mix" => self.mix(params, find)?,
-            "subsurface" => {
-                self.draft.approximated(&params.place, &params.element, "", "plastic, for light does not travel below surfaces");
-                for parameter in ["mfp", "mfreepath", "sigma_a", "sigma_s", "g", "scale", "name"] {
-                    params.ignore(parameter, "light does not travel below surfaces");
-                }
-                self.plastic(params, 1.33)?
-            }
-            "hair" => {
-                self.draft.approximated(&params.place, &params.element, "", "diffuse");
-                let brown = Texture::Constant([0.2, 0.1, 0.05]);
-                let color = self.textures.get(params, &self.colors, "reflectance", Meaning::Reflectance, false)?.unwrap_or(brown);
-                MaterialDesc::Diffuse { albedo: color.color(self.draft, &params.place), roughness: zero() }
-            }
+            "subsurface" => self.subsurface(params)?,
+            "hair" => self.hair(params)?,
             "measured" => {
                 params.ignore("filename", "measured materials are not known");
                 self.draft.approximated(&params.place, &params.element, "", "diffuse of 0.5");
@@ -89,6 +76,43 @@ impl Materials<'_> {
             }
             other => return Err(params.error(format!("there is no material \"{other}\""))),
         })
+    }
+
+    fn dielectric(&mut self, params: &Params) -> Result<MaterialDesc> {
+        let (ior, abbe) = self.colors.index(params, "eta", 1.5)?;
+        Ok(MaterialDesc::Dielectric(Box::new(DielectricDesc {
+            ior: RangedDesc::Constant(ior.clamp(0.1, 10.0)),
+            roughness: None,
+            alpha: self.alpha(params, "", 0.0)?,
+            distribution: DistributionDesc::default(),
+            multiscatter: false,
+            reflection_tint: ColorDesc::Grey(1.0),
+            transmission_tint: ColorDesc::Grey(1.0),
+            priority: None,
+            absorption: None,
+            abbe,
+        })))
+    }
+
+    fn subsurface(&mut self, params: &Params) -> Result<MaterialDesc> {
+        self.draft.approximated(
+            &params.place,
+            &params.element,
+            "",
+            "plastic, for light does not travel below surfaces",
+        );
+        for parameter in ["mfp", "mfreepath", "sigma_a", "sigma_s", "g", "scale", "name"] {
+            params.ignore(parameter, "light does not travel below surfaces");
+        }
+        self.plastic(params, 1.33)
+    }
+
+    fn hair(&mut self, params: &Params) -> Result<MaterialDesc> {
+        self.draft.approximated(&params.place, &params.element, "", "diffuse");
+        let brown = Texture::Constant([0.2, 0.1, 0.05]);
+        let color =
+            self.textures.get(params, &self.colors, "reflectance", Meaning::Reflectance, false)?.unwrap_or(brown);
+        Ok(MaterialDesc::Diffuse { albedo: color.color(self.draft, &params.place), roughness: zero() })
     }
 
     fn coated_conductor(&mut self, name: &str, params: &Params) -> Result<MaterialDesc> {
@@ -126,7 +150,12 @@ impl Materials<'_> {
 
     /// What pbrt's walk through layers has and Steradian's lacks.
     fn note_layers(&mut self, params: &Params) {
-        self.draft.approximated(&params.place, &params.element, "", "a closed form in place of a random walk between layers");
+        self.draft.approximated(
+            &params.place,
+            &params.element,
+            "",
+            "a closed form in place of a random walk between layers",
+        );
         for parameter in ["thickness", "albedo", "g", "maxdepth", "nsamples"] {
             params.ignore(parameter, "there is nothing between the layers");
         }
@@ -223,7 +252,9 @@ impl Materials<'_> {
 
     fn diffuse_transmission(&mut self, params: &Params) -> Result<MaterialDesc> {
         let scale = params.number_or("scale", 1.0)? as f32;
-        let part = |name: &str| -> Result<Texture> { Ok(self.textures.reflectance(params, &self.colors, name, 0.25)?.times([scale; 3])) };
+        let part = |name: &str| -> Result<Texture> {
+            Ok(self.textures.reflectance(params, &self.colors, name, 0.25)?.times([scale; 3]))
+        };
         let (mut reflectance, mut transmittance) = (part("reflectance")?, part("transmittance")?);
         if let (Texture::Constant(r), Texture::Constant(t)) = (&mut reflectance, &mut transmittance) {
             let sum = (0..3).map(|i| r[i] + t[i]).fold(0.0, f32::max);

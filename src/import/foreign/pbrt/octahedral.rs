@@ -48,7 +48,9 @@ pub fn lat_long(image: &RgbImage, mirrored: bool) -> RgbImage {
         for column in 0..width {
             let mut sum = [0.0f64; 3];
             for i in 0..SUBSAMPLES * SUBSAMPLES {
-                let at = |k: usize, sub: usize, size: usize| (k as f64 + (sub as f64 + 0.5) / SUBSAMPLES as f64) / size as f64;
+                let at = |k: usize, sub: usize, size: usize| {
+                    (k as f64 + (sub as f64 + 0.5) / SUBSAMPLES as f64) / size as f64
+                };
                 let (u, v) = (at(column, i % SUBSAMPLES, width), at(row, i / SUBSAMPLES, height));
                 let color = lookup(image, square_from_direction(pbrt_from_ours(direction(u, v), mirrored)));
                 sum.iter_mut().zip(color).for_each(|(sum, x)| *sum += f64::from(x));
@@ -98,7 +100,10 @@ mod tests {
                 let d = direction_from_square(square);
                 assert!((d.length() - 1.0).abs() < 1e-12);
                 let back = square_from_direction(d);
-                assert!((back[0] - square[0]).abs() < 1e-9 && (back[1] - square[1]).abs() < 1e-9, "{square:?} {back:?}");
+                assert!(
+                    (back[0] - square[0]).abs() < 1e-9 && (back[1] - square[1]).abs() < 1e-9,
+                    "{square:?} {back:?}"
+                );
             }
         }
     }
@@ -120,7 +125,9 @@ mod tests {
     fn all_pixels_have_the_same_solid_angle() {
         // The share of pixels within 60 degrees of the x axis is that of the cap, 1/4.
         let n = 200;
-        let within = |i: usize| direction_from_square([((i % n) as f64 + 0.5) / n as f64, ((i / n) as f64 + 0.5) / n as f64]).x > 0.5;
+        let within = |i: usize| {
+            direction_from_square([((i % n) as f64 + 0.5) / n as f64, ((i / n) as f64 + 0.5) / n as f64]).x > 0.5
+        };
         let share = (0..n * n).filter(|&i| within(i)).count() as f64 / (n * n) as f64;
         assert!((share - 0.25).abs() < 1e-3, "{share}");
     }
@@ -130,7 +137,8 @@ mod tests {
         // One bright quarter: x and y above 0 and z above 0, which in Steradian is x > 0, z < 0 and y > 0.
         let n = 64;
         let color = |d: DVec3| if d.min_element() > 0.0 { [1.0; 3] } else { [0.0; 3] };
-        let at = |i: usize| direction_from_square([((i % n) as f64 + 0.5) / n as f64, ((i / n) as f64 + 0.5) / n as f64]);
+        let at =
+            |i: usize| direction_from_square([((i % n) as f64 + 0.5) / n as f64, ((i / n) as f64 + 0.5) / n as f64]);
         let image = RgbImage { width: n, height: n, pixels: (0..n * n).map(|i| color(at(i))).collect() };
         for mirrored in [false, true] {
             let sky = lat_long(&image, mirrored);

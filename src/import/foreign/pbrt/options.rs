@@ -100,7 +100,11 @@ pub fn set_filter(draft: &mut Draft, filter: Option<&Typed>) -> Result<()> {
     draft.desc.film.filter = match kind.as_str() {
         "box" => FilterDesc::Box { radius: radius(0.5)?, samples: None },
         "triangle" => FilterDesc::Tent { radius: radius(2.0)?, samples: None },
-        "gaussian" => FilterDesc::Gaussian { radius: radius(1.5)?, sigma: params.positive_or("sigma", 0.5)? as f32, samples: None },
+        "gaussian" => FilterDesc::Gaussian {
+            radius: radius(1.5)?,
+            sigma: params.positive_or("sigma", 0.5)? as f32,
+            samples: None,
+        },
         "mitchell" => FilterDesc::Mitchell {
             radius: radius(2.0)?,
             b: params.number_or("B", 1.0 / 3.0)? as f32,
@@ -149,15 +153,23 @@ pub fn set_integrator(draft: &mut Draft, integrator: Option<&Typed>) -> Result<(
         max_depth = params.integer_or("maxdepth", 5)?;
         if kind == "ambientocclusion" || kind == "ao" {
             let distance = params.number("maxdistance")?.filter(|distance| *distance > 0.0);
-            draft.desc.integrator = IntegratorDesc::AmbientOcclusion { distance: distance.map(|distance| distance as f32) };
+            draft.desc.integrator =
+                IntegratorDesc::AmbientOcclusion { distance: distance.map(|distance| distance as f32) };
             params.report(draft);
             return Ok(());
         }
         match kind.as_str() {
             "path" => {}
-            "volpath" | "simplevolpath" => draft.approximated(&params.place, &params.element, "", "path tracing without volumes"),
+            "volpath" | "simplevolpath" => {
+                draft.approximated(&params.place, &params.element, "", "path tracing without volumes");
+            }
             "bdpt" | "mlt" | "sppm" | "simplepath" | "lightpath" | "randomwalk" => {
-                draft.approximated(&params.place, &params.element, "", "path tracing, which converges to the same picture");
+                draft.approximated(
+                    &params.place,
+                    &params.element,
+                    "",
+                    "path tracing, which converges to the same picture",
+                );
             }
             other => {
                 draft.approximated(&params.place, &params.element, "", format!("path tracing in place of \"{other}\""));

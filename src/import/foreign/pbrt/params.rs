@@ -74,7 +74,10 @@ pub struct Params {
 impl Params {
     /// All values that are text, some of which may be names of files.
     pub fn strings(&self) -> impl Iterator<Item = &String> {
-        self.list.iter().filter_map(|param| if let Values::Strings(texts) = &param.values { Some(texts) } else { None }).flatten()
+        self.list
+            .iter()
+            .filter_map(|param| if let Values::Strings(texts) = &param.values { Some(texts) } else { None })
+            .flatten()
     }
 
     /// No parameters, for a directive at a place.
@@ -90,7 +93,8 @@ impl Params {
             let declaration = lexer.string(&token);
             let mut words = declaration.split_ascii_whitespace();
             let (Some(kind), Some(name), None) = (words.next(), words.next(), words.next()) else {
-                return Err(lexer.error(token.at, format!("expected a parameter such as \"float radius\", not \"{declaration}\"")));
+                return Err(lexer
+                    .error(token.at, format!("expected a parameter such as \"float radius\", not \"{declaration}\"")));
             };
             if params.list.iter().any(|param| param.name == name) {
                 return Err(lexer.error(token.at, format!("\"{declaration}\": the parameter is given twice")));
@@ -100,7 +104,14 @@ impl Params {
             }
             let values = read_values(lexer, &token, kind)?;
             let (kind, name) = (kind.to_owned(), name.to_owned());
-            params.list.push(Param { kind, name, values, file: lexer.file.clone(), at: token.at, outcome: RefCell::default() });
+            params.list.push(Param {
+                kind,
+                name,
+                values,
+                file: lexer.file.clone(),
+                at: token.at,
+                outcome: RefCell::default(),
+            });
         }
         Ok(params)
     }
@@ -184,7 +195,9 @@ impl Params {
 
     /// Numbers in groups of `N`, as floats.
     pub fn groups<const N: usize>(&self, name: &str) -> Result<Option<Vec<[f32; N]>>> {
-        Ok(self.wide_groups(name)?.map(|groups| groups.into_iter().map(|group: [f64; N]| group.map(|x| x as f32)).collect()))
+        Ok(self
+            .wide_groups(name)?
+            .map(|groups| groups.into_iter().map(|group: [f64; N]| group.map(|x| x as f32)).collect()))
     }
 
     /// As [`groups`](Self::groups), as the file has them.
@@ -269,8 +282,8 @@ fn read_values(lexer: &mut Lexer, declaration: &Token, kind: &str) -> Result<Val
         "string" | "texture" => Values::Strings(Vec::new()),
         "bool" => Values::Bools(Vec::new()),
         // Of a spectrum: numbers, or the name of one, depending on the first value.
-        "spectrum" | "integer" | "float" | "point2" | "point3" | "point" | "vector2" | "vector3" | "vector" | "normal" | "normal3"
-        | "rgb" | "blackbody" => Values::Numbers(Vec::new()),
+        "spectrum" | "integer" | "float" | "point2" | "point3" | "point" | "vector2" | "vector3" | "vector"
+        | "normal" | "normal3" | "rgb" | "blackbody" => Values::Numbers(Vec::new()),
         _ => return Err(lexer.error(declaration.at, format!("there is no type of parameters \"{kind}\""))),
     };
     let open = lexer.peek()?.is_some_and(|token| token.kind == TokenKind::Open);
@@ -278,7 +291,9 @@ fn read_values(lexer: &mut Lexer, declaration: &Token, kind: &str) -> Result<Val
         lexer.take()?;
     }
     loop {
-        let Some(token) = lexer.take()? else { return Err(lexer.error(declaration.at, "the file ends within a parameter")) };
+        let Some(token) = lexer.take()? else {
+            return Err(lexer.error(declaration.at, "the file ends within a parameter"));
+        };
         if open && token.kind == TokenKind::Close {
             break;
         }
@@ -307,7 +322,9 @@ fn push_value(lexer: &Lexer, token: &Token, values: &mut Values) -> Result<()> {
             _ => return Err(lexer.error(token.at, format!("expected true or false, not {text}"))),
         },
         (Values::Numbers(_), _) => return Err(lexer.error(token.at, format!("expected a number, not \"{text}\""))),
-        (Values::Strings(_), _) => return Err(lexer.error(token.at, format!("expected a string in quotes, not {text}"))),
+        (Values::Strings(_), _) => {
+            return Err(lexer.error(token.at, format!("expected a string in quotes, not {text}")));
+        }
         (Values::Bools(_), _) => return Err(lexer.error(token.at, format!("expected true or false, not {text}"))),
     }
     Ok(())

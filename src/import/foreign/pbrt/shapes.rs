@@ -12,7 +12,10 @@ use super::state::{Graphics, ShapeMaterial, World};
 use super::textures::Textures;
 use super::triangles;
 use crate::assets::{MeshData, read_ply_attributes};
-use crate::desc::{CylinderDesc, DiskDesc, MaterialDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc, ShapeDesc, SmoothByDesc, SphereDesc};
+use crate::desc::{
+    CylinderDesc, DiskDesc, MaterialDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc, ShapeDesc, SmoothByDesc,
+    SphereDesc,
+};
 use crate::error::Result;
 use crate::import::foreign::Draft;
 use crate::math::{DAffine3, DVec3};
@@ -44,26 +47,37 @@ enum Form {
     File(String),
 }
 
+/// The name of a shape's material; black for what gives off light at an interface.
+fn material_name(draft: &mut Draft, params: &Params, graphics: &Graphics) -> Option<String> {
+    match graphics.material.as_deref()? {
+        ShapeMaterial::Interface => {
+            let how = "black, for what gives off light is no mere boundary";
+            draft.approximated(&params.place, &params.element, "Material", how);
+            Some(black(draft, &params.place))
+        }
+        ShapeMaterial::Material(material) => Some(material.name.clone()),
+    }
+}
+
 impl Shapes<'_> {
     /// Reads a shape; `None` if nothing of it can be seen.
-    pub fn read(&self, draft: &mut Draft, kind: &str, params: &Params, graphics: &Graphics) -> Result<Option<ShapeDesc>> {
+    pub fn read(
+        &self,
+        draft: &mut Draft,
+        kind: &str,
+        params: &Params,
+        graphics: &Graphics,
+    ) -> Result<Option<ShapeDesc>> {
         let mut light = graphics.area_light.as_deref();
         if light.is_some() && self.in_object {
             draft.ignored(&params.place, &params.element, "AreaLightSource", "instances give off no light, as in pbrt");
             light = None;
         }
-        let material = match graphics.material.as_deref() {
-            Some(ShapeMaterial::Interface) if light.is_none() => {
-                params.report(draft);
-                return Ok(None);
-            }
-            Some(ShapeMaterial::Interface) => {
-                draft.approximated(&params.place, &params.element, "Material", "black, for what gives off light is no mere boundary");
-                Some(black(draft, &params.place))
-            }
-            Some(ShapeMaterial::Material(material)) => Some(material.name.clone()),
-            None => None,
-        };
+        if light.is_none() && matches!(graphics.material.as_deref(), Some(ShapeMaterial::Interface)) {
+            params.report(draft);
+            return Ok(None);
+        }
+        let material = material_name(draft, params, graphics);
         let alpha = self.textures.number(params, &self.colors, "alpha", 1.0)?;
         if light.is_some() && params.has("alpha") {
             params.ignore("alpha", "what gives off light has no holes");
@@ -89,7 +103,12 @@ impl Shapes<'_> {
         };
         let mut ctm = graphics.ctm;
         if light.is_some() && ctm.is_moving() {
-            draft.approximated(&params.place, &params.element, "transform", "what gives off light stands still where it is at first");
+            draft.approximated(
+                &params.place,
+                &params.element,
+                "transform",
+                "what gives off light stands still where it is at first",
+            );
             ctm.0[1] = ctm.0[0];
         }
         let common = shape.common_mut();
@@ -108,7 +127,9 @@ impl Shapes<'_> {
             _ => None,
         };
         Needs {
-            uvs: cut_out || light.is_some_and(AreaLight::is_textured) || material.is_some_and(|material| material.is_textured),
+            uvs: cut_out
+                || light.is_some_and(AreaLight::is_textured)
+                || material.is_some_and(|material| material.is_textured),
             sides: light.is_some() || material.is_some_and(|material| material.has_inside),
             extent: light.is_some_and(AreaLight::needs_extent),
         }
@@ -116,7 +137,9 @@ impl Shapes<'_> {
 
     fn mesh_shape(&self, draft: &mut Draft, kind: &str, mesh: MeshData) -> ShapeDesc {
         if mesh.triangles.len() > MAX_INLINE {
-            return ShapeDesc::Mesh(MeshDesc::from_file(draft.keep_mesh(&format!("{kind}_{}", draft.assets.meshes.len()), mesh)));
+            return ShapeDesc::Mesh(MeshDesc::from_file(
+                draft.keep_mesh(&format!("{kind}_{}", draft.assets.meshes.len()), mesh),
+            ));
         }
         let shading = MeshShadingDesc::default();
         ShapeDesc::Mesh(MeshDesc::new(
@@ -157,7 +180,8 @@ impl Shapes<'_> {
                 let levels = params.integer_or("levels", 3)?.clamp(0, 64) as u32;
                 params.string("scheme")?;
                 let positions = params.groups("P")?.ok_or_else(|| params.error("needs positions P"))?;
-                let indices = params.indices("indices", positions.len())?.ok_or_else(|| params.error("needs indices"))?;
+                let indices =
+                    params.indices("indices", positions.len())?.ok_or_else(|| params.error("needs indices"))?;
                 if loop_subdivision::possible_levels(indices.len(), levels) < levels {
                     params.approximate("levels", "fewer, for there would be too many triangles");
                 }

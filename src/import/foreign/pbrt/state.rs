@@ -146,7 +146,8 @@ impl World {
         }
         // Keyframes have no mirror in them: it goes before the motion.
         let flip = Self { mirrored: self.mirrored != ctm.swaps_handedness(), ..*self }.mirror();
-        let keyframe = |i: usize| KeyframeDesc { time: self.times.0[i], transform: matrix(&(mirror * ctm.0[i] * flip)) };
+        let keyframe =
+            |i: usize| KeyframeDesc { time: self.times.0[i], transform: matrix(&(mirror * ctm.0[i] * flip)) };
         (matrix(&(flip * inner)), vec![keyframe(0), keyframe(1)])
     }
 }
@@ -159,7 +160,12 @@ pub fn matrix(map: &DAffine3) -> TransformDesc {
     let m = map.matrix3.transpose();
     let row = |r: DVec3, t: f64| [r.x, r.y, r.z, t];
     let t = map.translation;
-    TransformDesc(vec![TransformStepDesc::Matrix([row(m.x_axis, t.x), row(m.y_axis, t.y), row(m.z_axis, t.z), [0.0, 0.0, 0.0, 1.0]])])
+    TransformDesc(vec![TransformStepDesc::Matrix([
+        row(m.x_axis, t.x),
+        row(m.y_axis, t.y),
+        row(m.z_axis, t.z),
+        [0.0, 0.0, 0.0, 1.0],
+    ])])
 }
 
 /// The rotation nearest to a map that ought to be one, and its scale: x and y are turned least where they are not at

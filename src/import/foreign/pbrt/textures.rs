@@ -6,7 +6,8 @@ use super::colors::{Colors, Meaning};
 use super::params::Params;
 use crate::assets::read_image;
 use crate::desc::{
-    ChannelDesc, ColorDesc, ColorSpaceDesc, OpacityDesc, ScalarDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc,
+    ChannelDesc, ColorDesc, ColorSpaceDesc, OpacityDesc, ScalarDesc, TextureDesc, TextureFilterDesc, WrapDesc,
+    WrapModeDesc,
 };
 use crate::error::Result;
 use crate::image_data::{ImageData, Samples};
@@ -67,7 +68,9 @@ impl Texture {
     pub fn scalar(self, draft: &mut Draft, place: &str) -> ScalarDesc {
         match self {
             Self::Constant(value) => ScalarDesc::Constant(value[0].clamp(0.0, 1.0)),
-            named => named.name(draft, place).map_or(ScalarDesc::Constant(0.5), |texture| ScalarDesc::Texture { texture }),
+            named => {
+                named.name(draft, place).map_or(ScalarDesc::Constant(0.5), |texture| ScalarDesc::Texture { texture })
+            }
         }
     }
 
@@ -102,7 +105,14 @@ pub struct Textures {
 
 impl Textures {
     /// The value of a parameter: a texture by name, a number or a colour; `None` if it is not given.
-    pub fn get(&self, params: &Params, colors: &Colors, name: &str, meaning: Meaning, of_numbers: bool) -> Result<Option<Texture>> {
+    pub fn get(
+        &self,
+        params: &Params,
+        colors: &Colors,
+        name: &str,
+        meaning: Meaning,
+        of_numbers: bool,
+    ) -> Result<Option<Texture>> {
         let Some(param) = params.get(name) else { return Ok(None) };
         if param.kind != "texture" {
             return if of_numbers {
@@ -204,7 +214,9 @@ fn mix(params: &Params, first: Texture, second: Texture, amount: &Texture) -> Te
         }
     };
     match (&first, &second) {
-        (Texture::Constant(a), Texture::Constant(b)) => Texture::Constant(std::array::from_fn(|i| a[i] + (b[i] - a[i]) * share)),
+        (Texture::Constant(a), Texture::Constant(b)) => {
+            Texture::Constant(std::array::from_fn(|i| a[i] + (b[i] - a[i]) * share))
+        }
         _ if share == 0.0 => first,
         _ if share == 1.0 => second,
         _ => {
@@ -259,7 +271,8 @@ fn number_channel(image: &ImageData, params: &Params) -> Option<ChannelDesc> {
         Samples::F16(v) => v.get(i) == v.get(j),
         Samples::F32(v) => v.get(i) == v.get(j),
     };
-    let is_grey = image.channels < 3 || (0..pixels).map(|i| i * image.channels).all(|i| same(i, i + 1) && same(i, i + 2));
+    let is_grey =
+        image.channels < 3 || (0..pixels).map(|i| i * image.channels).all(|i| same(i, i + 1) && same(i, i + 2));
     if is_grey {
         return Some(ChannelDesc::R);
     }

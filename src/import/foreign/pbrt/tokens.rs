@@ -53,8 +53,16 @@ pub struct Lexer {
 impl Lexer {
     /// Begins to read a file's bytes.
     pub fn new(file: PathBuf, bytes: Vec<u8>) -> Self {
-        let name = file.file_name().map_or_else(|| file.display().to_string(), |name| name.to_string_lossy().into_owned());
-        Self { file, name, bytes: crate::file::without_mark(bytes), next: 0, at: Position { line: 1, column: 1 }, waiting: None }
+        let name =
+            file.file_name().map_or_else(|| file.display().to_string(), |name| name.to_string_lossy().into_owned());
+        Self {
+            file,
+            name,
+            bytes: crate::file::without_mark(bytes),
+            next: 0,
+            at: Position { line: 1, column: 1 },
+            waiting: None,
+        }
     }
 
     /// The text of a token.
@@ -86,7 +94,12 @@ impl Lexer {
 
     /// An error at a place of the file.
     pub fn error(&self, at: Position, message: impl Into<String>) -> Error {
-        Error::Parse { file: self.file.clone(), line: at.line as usize, column: at.column as usize, message: message.into() }
+        Error::Parse {
+            file: self.file.clone(),
+            line: at.line as usize,
+            column: at.column as usize,
+            message: message.into(),
+        }
     }
 
     /// A place of the file for reports.

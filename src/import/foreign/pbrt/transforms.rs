@@ -28,7 +28,8 @@ pub fn read(lexer: &mut Lexer, at: Position, directive: &str) -> Result<Option<C
         "LookAt" => Change::Concatenate(look_at(lexer, at)?),
         "Transform" | "ConcatTransform" => {
             let m: [f64; 16] = numbers(lexer, at)?;
-            let map = affine(&m).ok_or_else(|| lexer.error(at, format!("{directive}: the last row of the matrix must be 0 0 0 1")))?;
+            let map = affine(&m)
+                .ok_or_else(|| lexer.error(at, format!("{directive}: the last row of the matrix must be 0 0 0 1")))?;
             if directive == "Transform" { Change::Replace(map) } else { Change::Concatenate(map) }
         }
         _ => return Ok(None),
@@ -64,13 +65,15 @@ fn numbers<const N: usize>(lexer: &mut Lexer, at: Position) -> Result<[f64; N]> 
 fn look_at(lexer: &mut Lexer, at: Position) -> Result<DAffine3> {
     let n: [f64; 9] = numbers(lexer, at)?;
     let [from, to, up] = [0, 3, 6].map(|i| DVec3::new(n[i], n[i + 1], n[i + 2]));
-    let forward = (to - from).try_normalize().ok_or_else(|| lexer.error(at, "LookAt: looks at the very point it stands on"))?;
+    let forward =
+        (to - from).try_normalize().ok_or_else(|| lexer.error(at, "LookAt: looks at the very point it stands on"))?;
     let right = up.normalize_or_zero().cross(forward);
     if right.length() < 1e-12 {
         return Err(lexer.error(at, "LookAt: the up vector is parallel to the view direction"));
     }
     let right = right.normalize();
-    let world_from_camera = DAffine3 { matrix3: DMat3::from_cols(right, forward.cross(right), forward), translation: from };
+    let world_from_camera =
+        DAffine3 { matrix3: DMat3::from_cols(right, forward.cross(right), forward), translation: from };
     Ok(world_from_camera.inverse())
 }
 

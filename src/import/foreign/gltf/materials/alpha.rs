@@ -29,7 +29,9 @@ impl Builder<'_, '_> {
                     // Alpha is at most 1.
                     _ if cutoff > 1.0 => Some(OpacityDesc::Number(0.0)),
                     ScalarDesc::Constant(alpha) => (alpha < cutoff).then_some(OpacityDesc::Number(0.0)),
-                    ScalarDesc::Texture { texture } => Some(OpacityDesc::Texture { texture, threshold: Some(cutoff.max(0.0)) }),
+                    ScalarDesc::Texture { texture } => {
+                        Some(OpacityDesc::Texture { texture, threshold: Some(cutoff.max(0.0)) })
+                    }
                 })
             }
             AlphaMode::Blend => {

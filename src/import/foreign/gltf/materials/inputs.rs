@@ -65,7 +65,13 @@ impl<'b> Inputs<'b> {
     }
 
     /// A colour: a factor, times a texture if there is one.
-    pub fn color(&mut self, source: GltfSource, draft: &mut Draft, texture: Option<&TextureRef>, factor: [f32; 3]) -> Result<ColorDesc> {
+    pub fn color(
+        &mut self,
+        source: GltfSource,
+        draft: &mut Draft,
+        texture: Option<&TextureRef>,
+        factor: [f32; 3],
+    ) -> Result<ColorDesc> {
         let factor = factor.map(|f| self.share(f));
         let Some(texture) = texture.filter(|_| factor != [0.0; 3]) else { return Ok(ColorDesc::Rgb(factor)) };
         let Some(image) = self.image(source, draft, texture, None)? else { return Ok(ColorDesc::Rgb(factor)) };
@@ -98,11 +104,14 @@ impl<'b> Inputs<'b> {
     ) -> Result<ScalarDesc> {
         let factor = self.share(factor);
         let Some(texture) = texture.filter(|_| factor != 0.0) else { return Ok(ScalarDesc::Constant(factor)) };
-        let Some(image) = self.data(source, draft, texture, Some(channel))? else { return Ok(ScalarDesc::Constant(factor)) };
+        let Some(image) = self.data(source, draft, texture, Some(channel))? else {
+            return Ok(ScalarDesc::Constant(factor));
+        };
         if factor == 1.0 {
             return Ok(ScalarDesc::Texture { texture: image });
         }
-        let product = TextureDesc::Product { factors: vec![ColorDesc::Texture { texture: image }, ColorDesc::Grey(factor)] };
+        let product =
+            TextureDesc::Product { factors: vec![ColorDesc::Texture { texture: image }, ColorDesc::Grey(factor)] };
         Ok(ScalarDesc::Texture { texture: draft.add_texture("scaled", &texture.place, product) })
     }
 }

@@ -5,8 +5,8 @@ use super::super::extensions as ext;
 use super::super::textures::TextureRef;
 use super::Builder;
 use crate::desc::{
-    AbsorptionDesc, ChannelDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, PrincipledDesc, RangedDesc, RoughnessDesc,
-    ScalarDesc,
+    AbsorptionDesc, ChannelDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, PrincipledDesc, RangedDesc,
+    RoughnessDesc, ScalarDesc,
 };
 use crate::error::Result;
 
@@ -53,16 +53,23 @@ impl Builder<'_, '_> {
         if texture.is_some() {
             // In units of 0.08.
             desc.ior = None;
-            desc.specular = Some(self.inputs.scalar(self.source, self.draft, texture.as_ref(), ChannelDesc::A, mean / 0.08)?);
+            desc.specular =
+                Some(self.inputs.scalar(self.source, self.draft, texture.as_ref(), ChannelDesc::A, mean / 0.08)?);
         } else {
             reflect_ahead(desc, mean);
         }
-        let is_plain =
-            specular.specular_factor == 1.0 && texture.is_none() && specular.specular_color_texture.is_none() && r == g && g == b;
+        let is_plain = specular.specular_factor == 1.0
+            && texture.is_none()
+            && specular.specular_color_texture.is_none()
+            && r == g
+            && g == b;
         if is_plain {
             self.mapped(SPECULAR);
         } else {
-            self.approximated(SPECULAR, "grey reflectance ahead: the mean of the colour; at grazing angles all is reflected");
+            self.approximated(
+                SPECULAR,
+                "grey reflectance ahead: the mean of the colour; at grazing angles all is reflected",
+            );
         }
         Ok(())
     }
@@ -75,7 +82,10 @@ impl Builder<'_, '_> {
         if most > 0.0 {
             desc.sheen = ScalarDesc::Constant(most);
             desc.sheen_tint = ScalarDesc::Constant(1.0 - least / most);
-            self.approximated(SHEEN, "the principled model's sheen: of one width, white or of the base's colour, without textures");
+            self.approximated(
+                SHEEN,
+                "the principled model's sheen: of one width, white or of the base's colour, without textures",
+            );
         } else {
             self.mapped(SHEEN);
         }
@@ -127,7 +137,8 @@ impl Builder<'_, '_> {
     /// Glass: thin without a thickness, a medium if it absorbs or disperses and is glass all over.
     pub(super) fn transmission(&mut self, mut desc: PrincipledDesc) -> Result<MaterialDesc> {
         let volume = self.extension::<ext::Volume>(VOLUME)?;
-        let abbe = self.extension::<ext::Dispersion>(DISPERSION)?.map(|d| d.dispersion).filter(|d| *d > 0.0).map(|d| 20.0 / d);
+        let abbe =
+            self.extension::<ext::Dispersion>(DISPERSION)?.map(|d| d.dispersion).filter(|d| *d > 0.0).map(|d| 20.0 / d);
         let Some(transmission) = self.extension::<ext::Transmission>(TRANSMISSION)? else {
             for (name, is_there) in [(VOLUME, volume.is_some()), (DISPERSION, abbe.is_some())] {
                 if is_there {
@@ -137,8 +148,13 @@ impl Builder<'_, '_> {
             return Ok(MaterialDesc::Principled(Box::new(desc)));
         };
         let texture = self.texture(TRANSMISSION, "transmissionTexture", transmission.transmission_texture.as_ref())?;
-        desc.transmission =
-            self.inputs.scalar(self.source, self.draft, texture.as_ref(), ChannelDesc::R, transmission.transmission_factor)?;
+        desc.transmission = self.inputs.scalar(
+            self.source,
+            self.draft,
+            texture.as_ref(),
+            ChannelDesc::R,
+            transmission.transmission_factor,
+        )?;
         self.mapped(TRANSMISSION);
         desc.thin = volume.as_ref().is_none_or(|volume| volume.thickness_factor <= 0.0);
         if matches!(desc.transmission, ScalarDesc::Constant(0.0)) {
@@ -154,7 +170,12 @@ impl Builder<'_, '_> {
     }
 
     /// Glass that is not thin: a dielectric if it absorbs or disperses and is glass all over.
-    fn solid_glass(&mut self, mut desc: PrincipledDesc, volume: Option<&ext::Volume>, abbe: Option<f32>) -> MaterialDesc {
+    fn solid_glass(
+        &mut self,
+        mut desc: PrincipledDesc,
+        volume: Option<&ext::Volume>,
+        abbe: Option<f32>,
+    ) -> MaterialDesc {
         // Glass that is not thin has an index that bends light.
         let ior = match desc.ior {
             Some(RangedDesc::Constant(ior)) => ior.max(1.05),
@@ -167,7 +188,8 @@ impl Builder<'_, '_> {
             self.mapped(VOLUME);
             return MaterialDesc::Principled(Box::new(desc));
         }
-        let is_glass = matches!((&desc.transmission, &desc.metallic), (ScalarDesc::Constant(1.0), ScalarDesc::Constant(0.0)));
+        let is_glass =
+            matches!((&desc.transmission, &desc.metallic), (ScalarDesc::Constant(1.0), ScalarDesc::Constant(0.0)));
         if !is_glass {
             self.approximated(VOLUME, "nothing is absorbed within what is glass only in part");
             return MaterialDesc::Principled(Box::new(desc));
@@ -206,15 +228,23 @@ impl Builder<'_, '_> {
             return Ok(self.draft.add_material(&self.name, &self.path, base));
         };
         let texture = self.texture(CLEARCOAT, "clearcoatTexture", coat.clearcoat_texture.as_ref())?;
-        let amount = self.inputs.scalar(self.source, self.draft, texture.as_ref(), ChannelDesc::R, coat.clearcoat_factor)?;
+        let amount =
+            self.inputs.scalar(self.source, self.draft, texture.as_ref(), ChannelDesc::R, coat.clearcoat_factor)?;
         if matches!(amount, ScalarDesc::Constant(0.0)) {
             self.mapped(CLEARCOAT);
             return Ok(self.draft.add_material(&self.name, &self.path, base));
         }
-        let texture = self.texture(CLEARCOAT, "clearcoatRoughnessTexture", coat.clearcoat_roughness_texture.as_ref())?;
-        let roughness = self.inputs.scalar(self.source, self.draft, texture.as_ref(), ChannelDesc::G, coat.clearcoat_roughness_factor)?;
-        let is_opaque =
-            !self.has_transmission() || matches!(&base, MaterialDesc::Principled(p) if matches!(p.transmission, ScalarDesc::Constant(0.0)));
+        let texture =
+            self.texture(CLEARCOAT, "clearcoatRoughnessTexture", coat.clearcoat_roughness_texture.as_ref())?;
+        let roughness = self.inputs.scalar(
+            self.source,
+            self.draft,
+            texture.as_ref(),
+            ChannelDesc::G,
+            coat.clearcoat_roughness_factor,
+        )?;
+        let is_opaque = !self.has_transmission()
+            || matches!(&base, MaterialDesc::Principled(p) if matches!(p.transmission, ScalarDesc::Constant(0.0)));
         if !is_opaque {
             return Ok(self.coated_glass(base, amount, &roughness));
         }
@@ -271,5 +301,6 @@ pub(super) fn reflect_ahead(desc: &mut PrincipledDesc, reflectance: f32) {
 fn absorption(volume: &ext::Volume) -> Option<AbsorptionDesc> {
     let (color, distance) = (volume.attenuation_color, volume.attenuation_distance);
     let absorbs = distance > 0.0 && distance.is_finite() && color != [1.0; 3];
-    absorbs.then(|| AbsorptionDesc { color: color.map(|c| if c.is_nan() { 1.0 } else { c.clamp(1e-4, 1.0) }), distance })
+    absorbs
+        .then(|| AbsorptionDesc { color: color.map(|c| if c.is_nan() { 1.0 } else { c.clamp(1e-4, 1.0) }), distance })
 }

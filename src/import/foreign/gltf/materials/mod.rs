@@ -16,7 +16,9 @@ use super::GltfSource;
 use super::extensions as ext;
 use super::geometry::VertexColors;
 use super::textures::{TextureRef, TextureSet};
-use crate::desc::{ChannelDesc, ColorDesc, EmissionDesc, MaterialDesc, NormalMapDesc, OpacityDesc, PrincipledDesc, ScalarDesc};
+use crate::desc::{
+    ChannelDesc, ColorDesc, EmissionDesc, MaterialDesc, NormalMapDesc, OpacityDesc, PrincipledDesc, ScalarDesc,
+};
 use crate::error::Result;
 use crate::import::Draft;
 
@@ -78,8 +80,10 @@ impl MaterialSet {
         // Light cannot have colours of vertices.
         let is_unlit = json.extensions.as_ref().is_some_and(|all| all.others.contains_key(UNLIT));
         let is_colored = colors.is_some_and(|colors| colors.differ) && !is_unlit;
-        let tint =
-            colors.map_or([1.0; 4], |VertexColors { mean: [r, g, b, a], .. }| if is_colored { [1.0, 1.0, 1.0, a] } else { [r, g, b, a] });
+        let tint = colors.map_or(
+            [1.0; 4],
+            |VertexColors { mean: [r, g, b, a], .. }| if is_colored { [1.0, 1.0, 1.0, a] } else { [r, g, b, a] },
+        );
         let mixes_alpha = colors.is_some_and(|colors| colors.differ_in_alpha);
         let key = (index.map(|index| index.value()), tint.map(f32::to_bits), is_colored, mixes_alpha);
         if let Some(material) = self.done.get(&key) {
@@ -242,7 +246,8 @@ impl<'a> Builder<'a, '_> {
         self.color_texture = TextureRef::of_extension(self.source, &place, ext.diffuse_texture.as_ref())?;
         self.approximated(
             NAME,
-            "a principled material of the diffuse colour, with the mean of the specular factor and without their texture",
+            "a principled material of the diffuse colour, with the mean of the specular factor and without their \
+             texture",
         );
         let specular = ext.specular_factor.iter().map(|s| s.clamp(0.0, 1.0)).sum::<f32>() / 3.0;
         Ok(Some(Glossy { glossiness: ext.glossiness_factor, specular }))
@@ -277,7 +282,9 @@ impl<'a> Builder<'a, '_> {
 
     fn light(&mut self, texture: Option<&TextureRef>, radiance: [f32; 3]) -> Result<Option<EmissionDesc>> {
         if !radiance.iter().all(|r| r.is_finite() && *r >= 0.0) {
-            return Err(self.source.fault(&format!("{}.emissiveFactor", self.path), "light is finite and not negative"));
+            return Err(self
+                .source
+                .fault(&format!("{}.emissiveFactor", self.path), "light is finite and not negative"));
         }
         if radiance == [0.0; 3] {
             return Ok(None);

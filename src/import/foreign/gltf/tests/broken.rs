@@ -38,7 +38,8 @@ fn a_chain_of_nodes_may_be_long() {
 fn transforms_are_finite() {
     let mut asset = Asset::new(json!([{ "children": [1], "scale": [3e38, 1, 1] }]));
     let last = 11;
-    let chain = (1..=last).map(|i| if i < last { json!({ "children": [i + 1], "scale": [3e38, 1, 1] }) } else { json!({}) });
+    let chain =
+        (1..=last).map(|i| if i < last { json!({ "children": [i + 1], "scale": [3e38, 1, 1] }) } else { json!({}) });
     asset.json["nodes"].as_array_mut().unwrap().extend(chain);
     assert!(message(&asset).contains("the transform is not finite"));
     asset.json["nodes"] = json!([{ "rotation": [0, 0, 0, 0] }]);
@@ -55,7 +56,8 @@ fn what_the_file_needs_must_be_known() {
     assert!(imported.report.entries.iter().any(|e| e.element.contains("draco") && e.outcome == Outcome::Ignored));
     asset.json["extensionsRequired"] = json!(["KHR_materials_ior", "KHR_draco_mesh_compression", "KHR_texture_basisu"]);
     assert!(message(&asset).contains(
-        "extensionsRequired: the file cannot be read without KHR_draco_mesh_compression, KHR_texture_basisu, which is not supported"
+        "extensionsRequired: the file cannot be read without KHR_draco_mesh_compression, KHR_texture_basisu, which is \
+         not supported"
     ));
     asset.json["extensionsRequired"] = json!(["KHR_materials_ior", "KHR_mesh_quantization"]);
     asset.read();
@@ -144,11 +146,14 @@ fn buffers_must_be_there() {
 fn any_value_may_be_anything() {
     let mut asset = Asset::new(json!([{ "mesh": 0, "skin": 0, "camera": 0 }, { "translation": [1, 2, 3] }]));
     asset.square(json!({
-        "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } }, "normalTexture": { "index": 0 }, "alphaMode": "MASK",
+        "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } }, "normalTexture": { "index": 0 },
+        "alphaMode": "MASK",
         "emissiveFactor": [1, 1, 1],
         "extensions": {
             "KHR_materials_clearcoat": { "clearcoatFactor": 0.5, "clearcoatTexture": { "index": 0 } },
-            "KHR_materials_volume": { "thicknessFactor": 1, "attenuationDistance": 1, "attenuationColor": [0.5, 0.5, 0.5] },
+            "KHR_materials_volume": {
+                "thicknessFactor": 1, "attenuationDistance": 1, "attenuationColor": [0.5, 0.5, 0.5]
+            },
             "KHR_materials_transmission": { "transmissionFactor": 1 }
         }
     }));
@@ -163,7 +168,8 @@ fn any_value_may_be_anything() {
     let times = asset.floats(&[[0.0f32], [1.0]]);
     let values = asset.floats(&[[0.0f32, 0.0, 0.0], [1.0, 1.0, 1.0]]);
     asset.json["animations"] = json!([{
-        "channels": [{ "sampler": 0, "target": { "node": 1, "path": "translation" } }], "samplers": [{ "input": times, "output": values }]
+        "channels": [{ "sampler": 0, "target": { "node": 1, "path": "translation" } }],
+        "samplers": [{ "input": times, "output": values }]
     }]);
     asset.json["skins"] = json!([{ "joints": [1] }]);
     asset.json["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": 1.0, "znear": 0.5 } }]);
@@ -176,7 +182,17 @@ fn any_value_may_be_anything() {
     let mut paths = Vec::new();
     collect(&whole, &mut String::new(), &mut paths);
     assert!(paths.len() > 150, "{}", paths.len());
-    let odd = [json!(0), json!(1), json!(-1), json!(4_294_967_295u64), json!(1e30), json!("x"), json!([]), json!({}), Value::Null];
+    let odd = [
+        json!(0),
+        json!(1),
+        json!(-1),
+        json!(4_294_967_295u64),
+        json!(1e30),
+        json!("x"),
+        json!([]),
+        json!({}),
+        Value::Null,
+    ];
     for path in paths {
         for value in &odd {
             asset.json = whole.clone();

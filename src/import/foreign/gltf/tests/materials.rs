@@ -1,7 +1,9 @@
 //! Materials and textures.
 
 use super::*;
-use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, OpacityDesc, RangedDesc, RoughnessDesc, ScalarDesc, TextureDesc};
+use crate::desc::{
+    ChannelDesc, ColorDesc, ColorSpaceDesc, OpacityDesc, RangedDesc, RoughnessDesc, ScalarDesc, TextureDesc,
+};
 use crate::desc::{TextureFilterDesc, WrapDesc, WrapModeDesc};
 
 /// A square with this material, named `m`, and one texture of four pixels.
@@ -11,7 +13,8 @@ fn square_of(mut material: Value) -> Asset {
     asset.square(material);
     asset.json["textures"] = json!([{ "source": 0, "sampler": 0, "name": "map" }]);
     asset.json["samplers"] = json!([{}]);
-    asset.json["images"] = json!([{ "uri": png(2, 2, &[[255, 0, 0, 255], [0, 255, 0, 128], [0, 0, 255, 127], [9, 9, 9, 0]]) }]);
+    asset.json["images"] =
+        json!([{ "uri": png(2, 2, &[[255, 0, 0, 255], [0, 255, 0, 128], [0, 0, 255, 127], [9, 9, 9, 0]]) }]);
     asset
 }
 
@@ -24,7 +27,10 @@ fn constant(desc: &ScalarDesc) -> f32 {
 }
 
 /// An image, its channel and its colour space; a factor, if it is a product with one.
-fn image<'a>(imported: &'a Imported, name: &str) -> (&'a str, Option<ChannelDesc>, ColorSpaceDesc, Option<&'a ColorDesc>) {
+fn image<'a>(
+    imported: &'a Imported,
+    name: &str,
+) -> (&'a str, Option<ChannelDesc>, ColorSpaceDesc, Option<&'a ColorDesc>) {
     match &imported.desc.textures[name] {
         TextureDesc::Image { file, channel, color_space, .. } => (file, *channel, *color_space, None),
         TextureDesc::Product { factors } => match factors.as_slice() {
@@ -53,7 +59,8 @@ fn without_a_material_a_surface_is_rough_white_metal() {
 fn roughness_is_green_metal_is_blue_and_colour_is_srgb() {
     let texture = json!({ "index": 0 });
     let imported = look_of(json!({ "pbrMetallicRoughness": {
-        "baseColorTexture": texture, "metallicRoughnessTexture": texture, "roughnessFactor": 0.5, "baseColorFactor": [0.5, 1, 1, 1]
+        "baseColorTexture": texture, "metallicRoughnessTexture": texture, "roughnessFactor": 0.5,
+        "baseColorFactor": [0.5, 1, 1, 1]
     } }));
     let desc = principled(&imported, "m");
     let ColorDesc::Texture { texture: color } = &desc.base_color else { panic!() };
@@ -68,7 +75,11 @@ fn roughness_is_green_metal_is_blue_and_colour_is_srgb() {
     let ScalarDesc::Texture { texture: metallic } = &desc.metallic else { panic!() };
     assert_eq!(image(&imported, metallic).1, Some(ChannelDesc::B));
     assert_eq!(imported.assets.images.len(), 1);
-    assert!(imported.report.entries.iter().all(|e| e.outcome == Outcome::Mapped || e.element == "file"), "{:?}", imported.report);
+    assert!(
+        imported.report.entries.iter().all(|e| e.outcome == Outcome::Mapped || e.element == "file"),
+        "{:?}",
+        imported.report
+    );
 }
 
 #[test]
@@ -130,7 +141,10 @@ fn what_is_unlit_shows_its_colour() {
 fn normal_maps_are_relief_with_their_scale() {
     let imported = look_of(json!({ "normalTexture": { "index": 0, "scale": 0.5 } }));
     let name = imported.desc.shapes[0].common().material.unwrap();
-    let MaterialDesc::Relief { material, normal_map: Some(map), bump_map: None } = &imported.desc.materials[name] else { panic!() };
+    let MaterialDesc::Relief { material, normal_map: Some(map), bump_map: None } = &imported.desc.materials[name]
+    else {
+        panic!()
+    };
     assert_eq!((material.as_str(), map.strength, map.flip_y), ("m", 0.5, false));
     assert_eq!(image(&imported, &map.texture).2, ColorSpaceDesc::Linear);
 }
@@ -146,7 +160,10 @@ fn samplers_say_what_is_between_pixels_and_beyond_edges() {
     };
     assert_eq!(look(json!({})), (TextureFilterDesc::Trilinear, WrapDesc::default()));
     let sampler = json!({ "magFilter": 9728, "wrapS": 33071, "wrapT": 33648 });
-    assert_eq!(look(sampler), (TextureFilterDesc::Nearest, WrapDesc::Each([WrapModeDesc::Clamp, WrapModeDesc::Mirror])));
+    assert_eq!(
+        look(sampler),
+        (TextureFilterDesc::Nearest, WrapDesc::Each([WrapModeDesc::Clamp, WrapModeDesc::Mirror]))
+    );
     let sampler = json!({ "magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071 });
     assert_eq!(look(sampler), (TextureFilterDesc::Bilinear, WrapDesc::Both(WrapModeDesc::Clamp)));
     assert_eq!(look(json!({ "magFilter": 9729, "minFilter": 9987 })).0, TextureFilterDesc::Trilinear);
@@ -208,7 +225,8 @@ fn colours_of_vertices_multiply_the_base_colour() {
     assert!(matches!(&principled(&plain, "m").base_color, ColorDesc::Texture { texture } if texture == "vertex_color"));
 
     // One colour for all is a factor.
-    let even = colored(json!({ "pbrMetallicRoughness": { "baseColorFactor": [0.5, 1, 1, 1] } }), &[[0.5, 0.25, 1.0]; 4]);
+    let even =
+        colored(json!({ "pbrMetallicRoughness": { "baseColorFactor": [0.5, 1, 1, 1] } }), &[[0.5, 0.25, 1.0]; 4]);
     assert!(matches!(principled(&even, "m").base_color, ColorDesc::Rgb([0.25, 0.25, 1.0])));
     assert_eq!((mesh(&even, 0).colors(), outcome(&even, "COLOR_0")), (None, Some(Outcome::Mapped)));
 
@@ -258,7 +276,8 @@ fn a_clear_coat_is_a_dielectric_layer_of_its_strength() {
 #[test]
 fn anisotropy_keeps_both_widths() {
     let imported = look_of(json!({
-        "pbrMetallicRoughness": { "roughnessFactor": 0.5 }, "extensions": { "KHR_materials_anisotropy": { "anisotropyStrength": 0.5 } }
+        "pbrMetallicRoughness": { "roughnessFactor": 0.5 },
+        "extensions": { "KHR_materials_anisotropy": { "anisotropyStrength": 0.5 } }
     }));
     let desc = principled(&imported, "m");
     let alpha = constant(&desc.roughness).powi(2);
@@ -307,5 +326,8 @@ fn broken_images_and_indices_are_errors() {
     asset.json["materials"][0] = json!({ "extensions": { "KHR_materials_clearcoat": {
         "clearcoatFactor": 1, "clearcoatTexture": { "index": 7 } } } });
     let message = asset.try_read().unwrap_err().to_string();
-    assert!(message.contains("materials[0].extensions.KHR_materials_clearcoat.clearcoatTexture: there is no textures[7]"), "{message}");
+    assert!(
+        message.contains("materials[0].extensions.KHR_materials_clearcoat.clearcoatTexture: there is no textures[7]"),
+        "{message}"
+    );
 }

@@ -100,7 +100,8 @@ impl Asset {
     fn text(&self) -> String {
         let mut json = self.json.clone();
         let data: String = self.bytes.iter().map(|b| format!("%{b:02x}")).collect();
-        json["buffers"] = json!([{ "byteLength": self.bytes.len(), "uri": format!("data:application/octet-stream,{data}") }]);
+        json["buffers"] =
+            json!([{ "byteLength": self.bytes.len(), "uri": format!("data:application/octet-stream,{data}") }]);
         let lists = ["accessors", "bufferViews", "materials", "nodes"];
         json.as_object_mut().unwrap().retain(|key, value| !(lists.contains(&key.as_str()) && *value == json!([])));
         json.to_string()

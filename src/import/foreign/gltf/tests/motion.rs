@@ -10,7 +10,14 @@ fn moving<const N: usize>(path: &str, interpolation: &str, times: &[f32], values
     asset
 }
 
-fn animate<const N: usize>(asset: &mut Asset, node: usize, path: &str, interpolation: &str, times: &[f32], values: &[[f32; N]]) {
+fn animate<const N: usize>(
+    asset: &mut Asset,
+    node: usize,
+    path: &str,
+    interpolation: &str,
+    times: &[f32],
+    values: &[[f32; N]],
+) {
     let input = asset.floats(&times.iter().map(|t| [*t]).collect::<Vec<_>>());
     let output = asset.floats(values);
     let animation = json!({
@@ -65,7 +72,10 @@ fn the_first_animation_of_a_property_counts() {
     assert_close(place_at(&asset, 0.0).transform_point3(DVec3::X), [7.0, 0.0, 0.0]);
     let imported = asset.read();
     let ignored = |e: &&crate::import::ReportEntry| e.parameter == "channel" && e.outcome == Outcome::Ignored;
-    assert_eq!(imported.report.entries.iter().filter(ignored).map(|e| e.place.as_str()).collect::<Vec<_>>(), ["animations[1].channels[0]"]);
+    assert_eq!(
+        imported.report.entries.iter().filter(ignored).map(|e| e.place.as_str()).collect::<Vec<_>>(),
+        ["animations[1].channels[0]"]
+    );
 }
 
 #[test]
@@ -76,7 +86,10 @@ fn animations_that_make_no_sense_are_errors() {
     };
     fault(moving("translation", "LINEAR", &[0.0, 1.0], &[[0.0; 3]; 3]), "has 2 times, but 3 values");
     fault(moving("translation", "CUBICSPLINE", &[0.0, 1.0], &[[0.0; 3]; 2]), "has 2 times, but 2 values");
-    fault(moving("translation", "LINEAR", &[1.0, 1.0], &[[0.0; 3]; 2]), "time 1 of 2 does not come after the one before");
+    fault(
+        moving("translation", "LINEAR", &[1.0, 1.0], &[[0.0; 3]; 2]),
+        "time 1 of 2 does not come after the one before",
+    );
     fault(moving("translation", "LINEAR", &[0.0, f32::NAN], &[[0.0; 3]; 2]), "time 1 of 2");
     fault(moving("rotation", "LINEAR", &[0.0, 1.0], &[[0.0; 4]; 2]), "does not give a rotation");
     fault(moving("rotation", "LINEAR", &[0.0, 1.0], &[[0.0; 3]; 2]), "has elements of type VEC3, but VEC4 is needed");
@@ -110,7 +123,8 @@ fn morph_targets_add_up_by_their_weights() {
 #[test]
 fn the_same_mesh_in_two_shapes_is_two_meshes() {
     let mut asset = morphing();
-    asset.json["nodes"] = json!([{ "mesh": 0, "weights": [1, 0] }, { "mesh": 0, "weights": [0, 1] }, { "mesh": 0, "weights": [1, 0] }]);
+    asset.json["nodes"] =
+        json!([{ "mesh": 0, "weights": [1, 0] }, { "mesh": 0, "weights": [0, 1] }, { "mesh": 0, "weights": [1, 0] }]);
     asset.json["scenes"] = json!([{ "nodes": [0, 1, 2] }]);
     let imported = asset.read();
     assert_eq!((imported.desc.objects.len(), imported.desc.instances.len(), imported.desc.shapes.len()), (1, 2, 1));
@@ -125,7 +139,8 @@ fn skinned() -> Asset {
     asset.square(json!({}));
     let joints = asset.view(&[0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0]);
     let joints = asset.accessor(json!({ "bufferView": joints, "componentType": 5121, "count": 4, "type": "VEC4" }));
-    let weights = asset.floats(&[[1.0f32, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0], [0.5, 0.5, 0.0, 0.0]]);
+    let weights =
+        asset.floats(&[[1.0f32, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0], [0.5, 0.5, 0.0, 0.0]]);
     let normals = asset.floats(&[[0.0f32, 0.0, 1.0]; 4]);
     let attributes = &mut asset.json["meshes"][0]["primitives"][0]["attributes"];
     attributes["JOINTS_0"] = json!(joints);

@@ -32,7 +32,8 @@ fn matrices_are_written_column_by_column() {
 #[test]
 fn a_mesh_that_is_seen_twice_is_an_object() {
     let mut asset = Asset::new(json!([
-        { "mesh": 0, "translation": [1, 0, 0], "name": "left" }, { "mesh": 1, "name": "alone" }, { "mesh": 0, "translation": [2, 0, 0] }, { "mesh": 0, "scale": [0, 1, 1] }
+        { "mesh": 0, "translation": [1, 0, 0], "name": "left" }, { "mesh": 1, "name": "alone" },
+        { "mesh": 0, "translation": [2, 0, 0] }, { "mesh": 0, "scale": [0, 1, 1] }
     ]));
     asset.square(json!({ "name": "a" }));
     asset.square(json!({ "name": "b" }));
@@ -54,7 +55,8 @@ fn an_extension_places_a_mesh_many_times() {
     let mut asset = Asset::new(json!([{ "mesh": 0, "translation": [0, 0, 5], "name": "grass" }]));
     asset.square(json!({}));
     let places = asset.floats(&[[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0]]);
-    asset.json["nodes"][0]["extensions"] = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": places } } });
+    asset.json["nodes"][0]["extensions"] =
+        json!({ "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": places } } });
     let imported = asset.read();
     assert_eq!(imported.desc.instances.len(), 3);
     assert!(imported.desc.instances.iter().all(|instance| instance.name.is_none()));
@@ -118,7 +120,8 @@ fn without_a_camera_all_is_seen_and_without_a_light_it_is_lit() {
     for corner in [[100.0, 0.0, -30.0], [140.0, 0.0, -30.0], [100.0, 2.0, -30.0], [140.0, 2.0, -30.0]] {
         let p = DVec3::from(corner) - from;
         let depth = p.dot(forward);
-        let room = [1.0 - p.dot(up).abs() / (depth * tangent), 1.0 - p.dot(right).abs() / (depth * tangent * 16.0 / 9.0)];
+        let room =
+            [1.0 - p.dot(up).abs() / (depth * tangent), 1.0 - p.dot(right).abs() / (depth * tangent * 16.0 / 9.0)];
         assert!(depth > 0.0 && room.iter().all(|room| *room > 0.0), "{corner:?} {room:?}");
         nearest = room.into_iter().fold(nearest, f64::min);
     }
@@ -134,7 +137,10 @@ fn lights_shine_along_minus_z_by_their_units() {
     let mut asset = Asset::new(json!([
         { "translation": [1, 2, 3], "extensions": { "KHR_lights_punctual": { "light": 0 } } },
         { "rotation": [-half, 0, 0, half], "extensions": { "KHR_lights_punctual": { "light": 1 } } },
-        { "translation": [0, 5, 0], "rotation": [-half, 0, 0, half], "extensions": { "KHR_lights_punctual": { "light": 2 } } }
+        {
+            "translation": [0, 5, 0], "rotation": [-half, 0, 0, half],
+            "extensions": { "KHR_lights_punctual": { "light": 2 } }
+        }
     ]));
     asset.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
     asset.json["extensionsRequired"] = json!(["KHR_lights_punctual"]);
@@ -144,7 +150,8 @@ fn lights_shine_along_minus_z_by_their_units() {
         { "type": "spot", "intensity": 2, "spot": { "innerConeAngle": 0.1 } }
     ] } });
     let imported = asset.read();
-    let [LightDesc::Point(point), LightDesc::Directional(sun), LightDesc::Spot(spot)] = imported.desc.lights.as_slice() else {
+    let [LightDesc::Point(point), LightDesc::Directional(sun), LightDesc::Spot(spot)] = imported.desc.lights.as_slice()
+    else {
         panic!("{:?}", imported.desc.lights);
     };
     assert_eq!((point.position, point.intensity), ([1.0, 2.0, 3.0], [8.0, 4.0, 2.0]));

@@ -46,7 +46,9 @@ fn numbers_are_read_in_every_form() {
     // Signed bytes in proportion, four bytes apart, from the second element of the view on.
     let view = asset.view(&[9, 9, 9, 9, 127, 129, 128, 0, 0, 64, 0, 0, 0, 0, 127]);
     asset.json["bufferViews"][view]["byteStride"] = json!(4);
-    let positions = json!({ "bufferView": view, "byteOffset": 4, "componentType": 5120, "normalized": true, "count": 3, "type": "VEC3" });
+    let positions = json!({
+        "bufferView": view, "byteOffset": 4, "componentType": 5120, "normalized": true, "count": 3, "type": "VEC3"
+    });
     let positions = asset.accessor(positions);
     // Unsigned shorts as they are.
     let view = asset.view(&[1, 0, 0, 1, 3, 0, 0, 0, 5, 0, 6, 0]);
@@ -89,7 +91,10 @@ fn accessors_that_reach_too_far_are_errors() {
         let error = asset.try_read().unwrap_err().to_string();
         assert!(error.contains(message) && error.contains("scene.gltf"), "{error}");
     };
-    broken(&|a| a.json["accessors"][0]["count"] = json!(5), "5 elements do not fit into bufferViews[0], which has 48 bytes");
+    broken(
+        &|a| a.json["accessors"][0]["count"] = json!(5),
+        "5 elements do not fit into bufferViews[0], which has 48 bytes",
+    );
     broken(&|a| a.json["accessors"][0]["count"] = json!(u64::MAX), "elements do not fit");
     broken(&|a| a.json["accessors"][0]["byteOffset"] = json!(4), "4 elements do not fit");
     broken(&|a| a.json["accessors"][0]["byteOffset"] = json!(u64::MAX), "4 elements do not fit");
@@ -102,7 +107,10 @@ fn accessors_that_reach_too_far_are_errors() {
     broken(&|a| a.json["bufferViews"][0]["buffer"] = json!(1), "no element of this index");
     let sparse = |count: u64| {
         let part = json!({ "bufferView": 0, "componentType": 5121 });
-        json!({ "componentType": 5126, "count": count, "type": "VEC3", "sparse": { "count": 1, "indices": part, "values": { "bufferView": 0 } } })
+        json!({
+            "componentType": 5126, "count": count, "type": "VEC3",
+            "sparse": { "count": 1, "indices": part, "values": { "bufferView": 0 } }
+        })
     };
     broken(&|a| a.json["accessors"][0] = sparse(1 << 40), "more than the file has bytes");
     broken(

@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::desc::{
-    ColorDesc, ColorSpaceDesc, DistributionDesc, OpacityDesc, RangedDesc, RoughnessDesc, ScalarDesc, TextureDesc, TextureFilterDesc,
+    ColorDesc, ColorSpaceDesc, DistributionDesc, OpacityDesc, RangedDesc, RoughnessDesc, ScalarDesc, TextureDesc,
+    TextureFilterDesc,
 };
 
 const BITMAP: &str = r#"<texture type="bitmap" name="NAME"><string name="filename" value="a.png"/>MORE</texture>"#;
@@ -25,17 +26,24 @@ fn backs_are_black_unless_both_sides_are_wanted() {
             _ => None,
         }
     };
-    let is_black = |m: Option<MaterialDesc>| matches!(m, Some(MaterialDesc::Diffuse { albedo: ColorDesc::Grey(v), .. }) if v == 0.0);
+    let is_black = |m: Option<MaterialDesc>| {
+        matches!(
+            m, Some(MaterialDesc::Diffuse { albedo: ColorDesc::Grey(v), .. }) if v == 0.0
+        )
+    };
     for kind in ["diffuse", "conductor", "roughconductor", "plastic", "roughplastic", "principled"] {
         assert!(is_black(back(&format!("<bsdf type=\"{kind}\"/>"))), "{kind}");
         assert!(back(&format!("<bsdf type=\"twosided\"><bsdf type=\"{kind}\"/></bsdf>")).is_none(), "{kind}");
     }
     assert!(is_black(back("")), "a shape without a bsdf");
     let glass = r#"<bsdf type="principled"><float name="spec_trans" value="0.5"/></bsdf>"#;
-    for bsdf in ["<bsdf type=\"dielectric\"/>", "<bsdf type=\"thindielectric\"/>", "<bsdf type=\"principledthin\"/>", glass] {
+    for bsdf in
+        ["<bsdf type=\"dielectric\"/>", "<bsdf type=\"thindielectric\"/>", "<bsdf type=\"principledthin\"/>", glass]
+    {
         assert!(back(bsdf).is_none(), "{bsdf}");
     }
-    let two = r#"<bsdf type="twosided"><bsdf type="plastic"/><bsdf type="diffuse"><rgb name="reflectance" value="1 0 0"/></bsdf></bsdf>"#;
+    let two = r#"<bsdf type="twosided"><bsdf type="plastic"/><bsdf type="diffuse">
+        <rgb name="reflectance" value="1 0 0"/></bsdf></bsdf>"#;
     assert!(matches!(back(two), Some(MaterialDesc::Diffuse { albedo: ColorDesc::Rgb([1.0, 0.0, 0.0]), .. })));
     // Relief and holes keep the black back.
     let wrapped = format!(
@@ -62,7 +70,9 @@ fn indices_of_refraction_are_relative() {
 #[test]
 fn metals_by_name_index_and_mirror() {
     let metal = |inside: &str| match front(&format!("<bsdf type=\"roughconductor\">{inside}</bsdf>")) {
-        MaterialDesc::Conductor { eta, k, alpha, multiscatter, .. } => (eta.unwrap(), k.unwrap(), alpha.unwrap(), multiscatter),
+        MaterialDesc::Conductor { eta, k, alpha, multiscatter, .. } => {
+            (eta.unwrap(), k.unwrap(), alpha.unwrap(), multiscatter)
+        }
         other => panic!("{other:?}"),
     };
     let (eta, _, alpha, multiscatter) = metal(r#"<string name="material" value="Au"/>"#);
@@ -70,11 +80,13 @@ fn metals_by_name_index_and_mirror() {
     // Alpha is alpha itself, and light that is scattered twice is lost.
     assert!(matches!(alpha, RoughnessDesc::Isotropic(a) if a == 0.1) && !multiscatter);
     let (eta, k, alpha, _) = metal(
-        r#"<rgb name="eta" value="1 2 3"/><float name="k" value="4"/><float name="alpha_u" value="0.2"/><float name="alpha_v" value="0.3"/>"#,
+        r#"<rgb name="eta" value="1 2 3"/><float name="k" value="4"/><float name="alpha_u" value="0.2"/>
+        <float name="alpha_v" value="0.3"/>"#,
     );
     assert_eq!((eta, k), ([1.0, 2.0, 3.0], [4.0; 3]));
     assert!(matches!(alpha, RoughnessDesc::Anisotropic([0.2, 0.3])));
-    let mirror = r#"<bsdf type="conductor"><string name="material" value="none"/><float name="specular_reflectance" value="0.9"/></bsdf>"#;
+    let mirror = r#"<bsdf type="conductor"><string name="material" value="none"/>
+        <float name="specular_reflectance" value="0.9"/></bsdf>"#;
     assert!(matches!(front(mirror), MaterialDesc::Mirror { reflectance: ColorDesc::Grey(v) } if v == 0.9));
     assert!(matches!(front("<bsdf type=\"conductor\"/>"), MaterialDesc::Mirror { reflectance: ColorDesc::Grey(1.0) }));
     assert_eq!(metal("").0, [1e-6; 3]);
@@ -91,14 +103,19 @@ fn beckmann_is_the_default_of_rough_surfaces() {
     };
     let ggx = r#"<string name="distribution" value="ggx"/>"#;
     for kind in ["roughconductor", "roughdielectric", "roughplastic"] {
-        assert_eq!((of(&rough(kind, "")), of(&rough(kind, ggx))), (DistributionDesc::Beckmann, DistributionDesc::GgxSeparable), "{kind}");
+        assert_eq!(
+            (of(&rough(kind, "")), of(&rough(kind, ggx))),
+            (DistributionDesc::Beckmann, DistributionDesc::GgxSeparable),
+            "{kind}"
+        );
         assert!(notes(&format!("<shape type=\"sphere\">{}</shape>", rough(kind, ""))).is_empty(), "{kind}");
     }
 }
 
 #[test]
 fn each_alpha_has_its_texture() {
-    let text = format!(r#"<bsdf type="roughconductor">{}<float name="alpha_v" value="0.3"/></bsdf>"#, bitmap("alpha_u", ""));
+    let text =
+        format!(r#"<bsdf type="roughconductor">{}<float name="alpha_v" value="0.3"/></bsdf>"#, bitmap("alpha_u", ""));
     let MaterialDesc::Conductor { alpha: Some(RoughnessDesc::Axes { u, v }), .. } = front(&text) else { panic!() };
     assert!(matches!((u, v), (ScalarDesc::Texture { .. }, ScalarDesc::Constant(v)) if v == 0.3));
 }
@@ -121,11 +138,14 @@ fn plastics_are_as_written() {
 
 #[test]
 fn glass_has_colours_at_its_surface() {
-    let colors = r#"<rgb name="specular_reflectance" value="0.1 0.2 0.3"/><rgb name="specular_transmittance" value="0.4 0.5 0.6"/>"#;
+    let colors = r#"<rgb name="specular_reflectance" value="0.1 0.2 0.3"/>
+        <rgb name="specular_transmittance" value="0.4 0.5 0.6"/>"#;
     for kind in ["dielectric", "roughdielectric", "thindielectric"] {
         let (reflection, transmission) = match front(&format!(r#"<bsdf type="{kind}">{colors}</bsdf>"#)) {
             MaterialDesc::Dielectric(glass) => (glass.reflection_tint, glass.transmission_tint),
-            MaterialDesc::ThinDielectric { reflection_tint, transmission_tint, .. } => (reflection_tint, transmission_tint),
+            MaterialDesc::ThinDielectric { reflection_tint, transmission_tint, .. } => {
+                (reflection_tint, transmission_tint)
+            }
             other => panic!("{other:?}"),
         };
         assert!(matches!(reflection, ColorDesc::Rgb(color) if color == [0.1, 0.2, 0.3]), "{kind}");
@@ -139,7 +159,9 @@ fn principled_surfaces_have_mitsubas_defaults() {
     let zero = |s: &ScalarDesc| matches!(s, ScalarDesc::Constant(v) if *v == 0.0);
     assert!(zero(&p.clearcoat_gloss) && zero(&p.sheen_tint) && zero(&p.transmission) && !p.multiscatter && !p.thin);
     assert!(matches!(p.specular, Some(ScalarDesc::Constant(v)) if v == 0.5) && p.ior.is_none());
-    let MaterialDesc::Principled(p) = front(r#"<bsdf type="principled"><float name="eta" value="1.4"/></bsdf>"#) else { panic!() };
+    let MaterialDesc::Principled(p) = front(r#"<bsdf type="principled"><float name="eta" value="1.4"/></bsdf>"#) else {
+        panic!()
+    };
     assert!(p.specular.is_none() && (ior(p.ior.as_ref().unwrap()) - 1.4).abs() < 1e-6);
     let thin = r#"<bsdf type="principledthin"><float name="diff_trans" value="1.5"/></bsdf>"#;
     let MaterialDesc::Principled(p) = front(thin) else { panic!() };
@@ -154,20 +176,31 @@ fn principled_surfaces_have_mitsubas_defaults() {
 fn attributes_of_meshes_are_colours_of_vertices() {
     let attribute = |name: &str, more: &str| {
         format!(
-            r#"<bsdf type="diffuse"><texture type="mesh_attribute" name="reflectance"><string name="name" value="{name}"/>{more}</texture></bsdf>"#
+            r#"<bsdf type="diffuse"><texture type="mesh_attribute" name="reflectance">
+            <string name="name" value="{name}"/>{more}</texture></bsdf>"#
         )
     };
     let shape = |bsdf: &str| format!(r#"<shape type="ply"><string name="filename" value="m.ply"/>{bsdf}</shape>"#);
     let desc = scene(&shape(&attribute("vertex_color", "")));
-    let is_attribute = |desc: &SceneDesc, expected: &str, factor: f32| matches!(desc.textures.values().collect::<Vec<_>>()[..], [TextureDesc::MeshAttribute { name, scale }] if name == expected && *scale == factor);
+    let is_attribute = |desc: &SceneDesc, expected: &str, factor: f32| {
+        matches!(
+            desc.textures.values().collect::<Vec<_>>()[..],
+            [TextureDesc::MeshAttribute { name, scale }] if name == expected && *scale == factor
+        )
+    };
     assert!(is_attribute(&desc, "vertex_color", 1.0));
     let scaled = scene(&shape(&attribute("vertex_color", r#"<float name="scale" value="0.5"/>"#)));
     assert!(is_attribute(&scaled, "vertex_color", 0.5));
     assert!(is_attribute(&scene(&shape(&attribute("face_temp", ""))), "face_temp", 1.0));
     assert!(message(&shape(&attribute("temp", ""))).contains("vertex_ or face_"));
-    let hole = r#"<bsdf type="mask"><texture type="mesh_attribute" name="opacity"><string name="name" value="vertex_a"/></texture><bsdf type="diffuse"/></bsdf>"#;
-    assert!(matches!(scene(&shape(hole)).shapes[0].common().opacity, Some(OpacityDesc::Texture { texture, .. }) if texture == "vertex_a"));
-    let light = r#"<emitter type="area"><texture type="mesh_attribute" name="radiance"><string name="name" value="vertex_color"/></texture></emitter>"#;
+    let hole = r#"<bsdf type="mask"><texture type="mesh_attribute" name="opacity">
+        <string name="name" value="vertex_a"/></texture><bsdf type="diffuse"/></bsdf>"#;
+    assert!(matches!(
+        scene(&shape(hole)).shapes[0].common().opacity,
+        Some(OpacityDesc::Texture { texture, .. }) if texture == "vertex_a"
+    ));
+    let light = r#"<emitter type="area"><texture type="mesh_attribute" name="radiance">
+        <string name="name" value="vertex_color"/></texture></emitter>"#;
     assert_eq!(scene(&shape(light)).shapes[0].common().emission.unwrap().texture.as_deref(), Some("vertex_color"));
     assert!(notes(&shape(light)).is_empty());
 }
@@ -181,7 +214,8 @@ fn masks_and_null_are_holes_of_the_shape() {
     assert!(matches!(opacity(r#"<bsdf type="null"/>"#).0, Some(OpacityDesc::Number(v)) if v == 0.0));
     let mask = r#"<bsdf type="mask"><float name="opacity" value="0.25"/><bsdf type="diffuse"/></bsdf>"#;
     assert!(matches!(opacity(mask).0, Some(OpacityDesc::Number(v)) if v == 0.25));
-    let (textured, textures) = opacity(&format!("<bsdf type=\"mask\">{}<bsdf type=\"diffuse\"/></bsdf>", bitmap("opacity", "")));
+    let (textured, textures) =
+        opacity(&format!("<bsdf type=\"mask\">{}<bsdf type=\"diffuse\"/></bsdf>", bitmap("opacity", "")));
     // The luminance counts, not the alpha that the image may have: the product of one factor is no image.
     let Some(OpacityDesc::Texture { texture, .. }) = textured else { panic!() };
     assert!(matches!(textures[&texture], TextureDesc::Product { .. }));
@@ -216,11 +250,18 @@ fn images_are_srgb_unless_raw_or_floats() {
 
 #[test]
 fn blends_and_reliefs_consist_of_others() {
-    let blend = r#"<bsdf type="blendbsdf"><float name="weight" value="0.3"/><bsdf type="diffuse"/><bsdf type="plastic"/></bsdf>"#;
+    let blend = r#"<bsdf type="blendbsdf"><float name="weight" value="0.3"/><bsdf type="diffuse"/>
+        <bsdf type="plastic"/></bsdf>"#;
     let MaterialDesc::Mix { amount: ScalarDesc::Constant(v), .. } = front(blend) else { panic!() };
     assert_eq!(v, 0.3);
-    assert!(message("<shape type=\"sphere\"><bsdf type=\"blendbsdf\"><bsdf type=\"diffuse\"/></bsdf></shape>").contains("needs 2 bsdfs"));
-    let bump = format!("<bsdf type=\"bumpmap\"><float name=\"scale\" value=\"0.5\"/>{}<bsdf type=\"diffuse\"/></bsdf>", bitmap("x", ""));
+    assert!(
+        message("<shape type=\"sphere\"><bsdf type=\"blendbsdf\"><bsdf type=\"diffuse\"/></bsdf></shape>")
+            .contains("needs 2 bsdfs")
+    );
+    let bump = format!(
+        "<bsdf type=\"bumpmap\"><float name=\"scale\" value=\"0.5\"/>{}<bsdf type=\"diffuse\"/></bsdf>",
+        bitmap("x", "")
+    );
     let MaterialDesc::Relief { bump_map: Some(map), .. } = front(&bump) else { panic!() };
     assert_eq!(map.height, 0.5);
     let normal = format!("<bsdf type=\"normalmap\">{}<bsdf type=\"diffuse\"/></bsdf>", bitmap("normalmap", ""));
@@ -241,12 +282,21 @@ fn parts_and_textures_may_be_references() {
         r#"{}<bsdf type="diffuse" id="d"><rgb name="reflectance" value="1 0 0"/></bsdf><bsdf type="plastic" id="p"/>"#,
         bitmap("t", "").replace("name=", "id=").replacen("id=\"filename\"", "name=\"filename\"", 1)
     );
-    let nested = |bsdf: &str| scene(&format!("{shared}<shape type=\"sphere\"><bsdf type=\"twosided\">{bsdf}</bsdf></shape>"));
-    let is_red = |desc: &SceneDesc, name: &str| matches!(&desc.materials[name], MaterialDesc::Diffuse { albedo: ColorDesc::Rgb(c), .. } if *c == [1.0, 0.0, 0.0]);
+    let nested =
+        |bsdf: &str| scene(&format!("{shared}<shape type=\"sphere\"><bsdf type=\"twosided\">{bsdf}</bsdf></shape>"));
+    let is_red = |desc: &SceneDesc, name: &str| {
+        matches!(
+            &desc.materials[name], MaterialDesc::Diffuse { albedo: ColorDesc::Rgb(c), .. } if *c == [1.0, 0.0, 0.0]
+        )
+    };
     for (bsdf, texture) in [("normalmap", "normalmap"), ("bumpmap", "arbitrary")] {
-        for part in ["<ref id=\"d\"/>", "<ref name=\"bsdf\" id=\"d\"/>", "<bsdf type=\"twosided\"><ref id=\"d\"/></bsdf>"] {
+        for part in
+            ["<ref id=\"d\"/>", "<ref name=\"bsdf\" id=\"d\"/>", "<bsdf type=\"twosided\"><ref id=\"d\"/></bsdf>"]
+        {
             let desc = nested(&format!("<bsdf type=\"{bsdf}\"><ref name=\"{texture}\" id=\"t\"/>{part}</bsdf>"));
-            let MaterialDesc::Relief { material: inner, normal_map, bump_map } = material(&desc, 0) else { panic!("{bsdf} {part}") };
+            let MaterialDesc::Relief { material: inner, normal_map, bump_map } = material(&desc, 0) else {
+                panic!("{bsdf} {part}")
+            };
             assert!(is_red(&desc, &inner), "{bsdf} {part}");
             assert_eq!(normal_map.map(|map| map.texture).or(bump_map.map(|map| map.texture)).as_deref(), Some("t"));
         }
@@ -257,15 +307,23 @@ fn parts_and_textures_may_be_references() {
     let desc = nested("<bsdf type=\"mask\"><ref name=\"opacity\" id=\"t\"/><ref id=\"d\"/></bsdf>");
     assert!(is_red(&desc, desc.shapes[0].common().material.unwrap()));
     assert!(matches!(desc.shapes[0].common().opacity, Some(OpacityDesc::Texture { .. })));
-    assert!(message("<shape type=\"sphere\"><bsdf type=\"bumpmap\"><ref id=\"x\"/></bsdf></shape>").contains("nothing has the id"));
+    assert!(
+        message("<shape type=\"sphere\"><bsdf type=\"bumpmap\"><ref id=\"x\"/></bsdf></shape>")
+            .contains("nothing has the id")
+    );
 }
 
 #[test]
 fn where_a_number_is_needed_checkers_have_the_other_colour() {
     // As in Mitsuba 3.9.
-    let checker =
-        r#"<texture type="checkerboard" name="NAME"><float name="color0" value="0.1"/><float name="color1" value="0.9"/></texture>"#;
-    let first = |bsdf: &str| match scene(&format!("<shape type=\"rectangle\">{bsdf}</shape>")).textures.into_values().next().unwrap() {
+    let checker = r#"<texture type="checkerboard" name="NAME"><float name="color0" value="0.1"/>
+        <float name="color1" value="0.9"/></texture>"#;
+    let first = |bsdf: &str| match scene(&format!("<shape type=\"rectangle\">{bsdf}</shape>"))
+        .textures
+        .into_values()
+        .next()
+        .unwrap()
+    {
         TextureDesc::Checker { color0, .. } => color0[0],
         other => panic!("{other:?}"),
     };
@@ -286,7 +344,8 @@ fn spectra_become_colours() {
     let found = color(r#"<spectrum name="reflectance" value="400:0.1, 500:0.2, 600:0.6, 700:0.4"/>"#);
     assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 0.003), "{found:?}");
     let text = format!(
-        r#"<scene version="3.0.0">{SENSOR}<shape type="sphere"><bsdf type="diffuse"><spectrum name="reflectance" filename="a.spd"/></bsdf></shape></scene>"#
+        r#"<scene version="3.0.0">{SENSOR}<shape type="sphere"><bsdf type="diffuse">
+        <spectrum name="reflectance" filename="a.spd"/></bsdf></shape></scene>"#
     );
     assert!(read_with(&text, &[], &[("a.spd", b"400 0.5\n700 0.5\n")]).is_ok());
     assert!(read_with(&text, &[], &[("a.spd", b"400\n")]).unwrap_err().to_string().contains("line 1"));

@@ -48,7 +48,12 @@ fn message(body: &str) -> String {
 #[track_caller]
 fn notes(body: &str) -> Vec<(Outcome, String, String)> {
     let report = try_scene(body).unwrap().report;
-    report.entries.into_iter().filter(|e| e.outcome != Outcome::Mapped).map(|e| (e.outcome, e.parameter, e.note)).collect()
+    report
+        .entries
+        .into_iter()
+        .filter(|e| e.outcome != Outcome::Mapped)
+        .map(|e| (e.outcome, e.parameter, e.note))
+        .collect()
 }
 
 /// The material of a sphere with this BSDF, without its black back.

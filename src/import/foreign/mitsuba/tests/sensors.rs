@@ -45,8 +45,13 @@ fn steps_of_transforms_act_in_their_order() {
 #[test]
 fn every_axis_of_the_field_of_view() {
     let fov = |axis: &str| {
-        let axis = if axis.is_empty() { String::new() } else { format!("<string name=\"fov_axis\" value=\"{axis}\"/>") };
-        (0.5 * camera("perspective", &format!("<float name=\"fov\" value=\"60\"/>{axis}")).vertical_fov_degrees.unwrap()).to_radians().tan()
+        let axis =
+            if axis.is_empty() { String::new() } else { format!("<string name=\"fov_axis\" value=\"{axis}\"/>") };
+        (0.5 * camera("perspective", &format!("<float name=\"fov\" value=\"60\"/>{axis}"))
+            .vertical_fov_degrees
+            .unwrap())
+        .to_radians()
+        .tan()
     };
     let half = 30f64.to_radians().tan();
     assert_near(fov(""), half / 2.0);
@@ -77,7 +82,10 @@ fn a_scale_of_the_camera_is_dropped_or_is_its_size() {
 
 #[test]
 fn thin_lenses_and_shifts() {
-    let lens = camera("thinlens", r#"<float name="aperture_radius" value="0.5"/><float name="focus_distance" value="7"/>"#).lens.unwrap();
+    let lens =
+        camera("thinlens", r#"<float name="aperture_radius" value="0.5"/><float name="focus_distance" value="7"/>"#)
+            .lens
+            .unwrap();
     assert_eq!((lens.radius, lens.focus_distance), (Some(0.5), Some(7.0)));
     let shift = camera(
         "perspective",
@@ -89,14 +97,19 @@ fn thin_lenses_and_shifts() {
 #[test]
 fn films_and_filters() {
     let film = |inside: &str| {
-        let text = format!("<scene version=\"3.0.0\"><sensor type=\"perspective\"><film type=\"hdrfilm\">{inside}</film></sensor></scene>");
+        let text = format!(
+            "<scene version=\"3.0.0\"><sensor type=\"perspective\">\
+             <film type=\"hdrfilm\">{inside}</film></sensor></scene>"
+        );
         read_with(&text, &[], &[]).unwrap().desc
     };
     let desc = film("");
     assert_eq!((desc.film.width, desc.film.height, desc.film.crop), (768, 576, None));
     assert_eq!(desc.film.filter, FilterDesc::Gaussian { radius: 2.0, sigma: 0.5, samples: None });
-    let crop = r#"<integer name="crop_offset_x" value="3"/><integer name="crop_offset_y" value="4"/><integer name="crop_width" value="5"/>
-        <integer name="crop_height" value="6"/><string name="component_format" value="float32"/><rfilter type="catmullrom"/>"#;
+    let crop = r#"<integer name="crop_offset_x" value="3"/><integer name="crop_offset_y" value="4"/>
+        <integer name="crop_width" value="5"/>
+        <integer name="crop_height" value="6"/><string name="component_format" value="float32"/>
+        <rfilter type="catmullrom"/>"#;
     let desc = film(crop);
     assert_eq!(desc.film.crop, Some([3, 4, 5, 6]));
     assert_eq!(desc.film.filter, FilterDesc::Mitchell { radius: 2.0, b: 0.0, c: 0.5, samples: None });
@@ -109,12 +122,14 @@ fn films_and_filters() {
 
 #[test]
 fn samplers_and_integrators() {
-    let with = r#"<sampler type="multijitter"><integer name="sample_count" value="9"/><integer name="seed" value="3"/></sampler>"#;
+    let with = r#"<sampler type="multijitter"><integer name="sample_count" value="9"/>
+        <integer name="seed" value="3"/></sampler>"#;
     let sampler = sensor("perspective", with).desc.sampler;
     assert_eq!((sampler.spp, sampler.seed, sampler.kind), (9, 3, SamplerKindDesc::Sobol));
     let independent = sensor("perspective", r#"<sampler type="independent"/>"#);
     assert_eq!((independent.desc.sampler.kind, independent.report.is_exact()), (SamplerKindDesc::Sobol, true));
-    let is_noted = |entry: &ReportEntry| entry.element == "sampler independent" && entry.note.contains("--sampler independent");
+    let is_noted =
+        |entry: &ReportEntry| entry.element == "sampler independent" && entry.note.contains("--sampler independent");
     assert!(independent.report.entries.iter().any(is_noted));
     let integrator = |text: &str| match scene(text).integrator {
         IntegratorDesc::Path { max_depth, rr_depth, .. } => (max_depth, rr_depth),
@@ -122,13 +137,20 @@ fn samplers_and_integrators() {
     };
     assert_eq!(integrator(""), (65_536, 5));
     assert_eq!(integrator(r#"<integrator type="path"><integer name="max_depth" value="-1"/></integrator>"#).0, 65_536);
-    let inner = r#"<integrator type="moment"><integrator type="path"><integer name="max_depth" value="7"/><integer name="rr_depth" value="9"/></integrator></integrator>"#;
+    let inner = r#"<integrator type="moment"><integrator type="path"><integer name="max_depth" value="7"/>
+        <integer name="rr_depth" value="9"/></integrator></integrator>"#;
     assert_eq!(integrator(inner), (7, 9));
     assert_eq!(integrator(r#"<integrator type="direct"/>"#).0, 2);
     let hidden = r#"<integrator type="KIND"><boolean name="hide_emitters" value="true"/></integrator>"#;
     assert!(notes(&hidden.replace("KIND", "path")).is_empty());
-    assert!(matches!(scene(&hidden.replace("KIND", "direct")).integrator, IntegratorDesc::Path { hide_emitters: true, .. }));
+    assert!(matches!(
+        scene(&hidden.replace("KIND", "direct")).integrator,
+        IntegratorDesc::Path { hide_emitters: true, .. }
+    ));
     let depth = notes(&hidden.replace("KIND", "depth"));
-    assert!(depth.iter().any(|(outcome, name, _)| *outcome == Outcome::Ignored && name == "hide_emitters"), "{depth:?}");
+    assert!(
+        depth.iter().any(|(outcome, name, _)| *outcome == Outcome::Ignored && name == "hide_emitters"),
+        "{depth:?}"
+    );
     assert!(notes(r#"<integrator type="path"><boolean name="hide_emitters" value="false"/></integrator>"#).is_empty());
 }

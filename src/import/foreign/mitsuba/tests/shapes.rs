@@ -15,7 +15,8 @@ fn mesh(desc: &SceneDesc, i: usize) -> &MeshDesc {
 #[track_caller]
 fn image(shape: &str, to_uv: &str) -> ([f32; 2], f64, [f32; 2]) {
     let bitmap = format!(
-        r#"<bsdf type="diffuse"><texture type="bitmap" name="reflectance"><string name="filename" value="a.png"/>{to_uv}</texture></bsdf>"#
+        r#"<bsdf type="diffuse"><texture type="bitmap" name="reflectance">
+        <string name="filename" value="a.png"/>{to_uv}</texture></bsdf>"#
     );
     let desc = scene(&shape.replace("BSDF", &bitmap));
     match desc.textures.values().next().unwrap() {
@@ -41,7 +42,11 @@ fn images_have_their_origin_at_the_top_left() {
     assert_near(degrees.abs(), 90.0);
     assert_near(f64::from(scale[0] * scale[1]), 1.0);
     let mesh = |kind: &str, flip: &str| {
-        let flip = if flip.is_empty() { String::new() } else { format!("<boolean name=\"flip_tex_coords\" value=\"{flip}\"/>") };
+        let flip = if flip.is_empty() {
+            String::new()
+        } else {
+            format!("<boolean name=\"flip_tex_coords\" value=\"{flip}\"/>")
+        };
         image(&format!("<shape type=\"{kind}\"><string name=\"filename\" value=\"a.{kind}\"/>{flip}BSDF</shape>"), "")
     };
     // Mitsuba turns the v of OBJ files over, not that of PLY files.
@@ -62,7 +67,8 @@ fn transforms_of_uv_act_before_the_image_is_looked_up() {
     assert_near(f64::from(scale[0]), 2.0);
     assert_near(f64::from(scale[1]), -3.0);
     assert_near(degrees, -30.0);
-    let sheared = r#"<shape type="rectangle"><bsdf type="diffuse"><texture type="bitmap" name="reflectance"><string name="filename" value="a.png"/>
+    let sheared = r#"<shape type="rectangle"><bsdf type="diffuse"><texture type="bitmap" name="reflectance">
+<string name="filename" value="a.png"/>
 <transform name="to_uv"><rotate z="1" angle="30"/><scale x="2" y="3"/></transform></texture></bsdf></shape>"#;
     assert!(notes(sheared).iter().any(|(_, _, note)| note.contains("shears")));
 }
@@ -70,8 +76,10 @@ fn transforms_of_uv_act_before_the_image_is_looked_up() {
 #[test]
 fn one_texture_on_different_shapes_becomes_two() {
     let desc = scene(
-        r#"<bsdf type="diffuse" id="m"><texture type="bitmap" name="reflectance"><string name="filename" value="a.png"/></texture></bsdf>
-<shape type="rectangle"><ref id="m"/></shape><shape type="sphere"><ref id="m"/></shape><shape type="cube"><ref id="m"/></shape>"#,
+        r#"<bsdf type="diffuse" id="m"><texture type="bitmap" name="reflectance">
+<string name="filename" value="a.png"/></texture></bsdf>
+<shape type="rectangle"><ref id="m"/></shape><shape type="sphere"><ref id="m"/></shape><shape type="cube">
+<ref id="m"/></shape>"#,
     );
     assert_eq!(desc.textures.len(), 2);
     let name = |i: usize| shape(&desc, i).common().material;
@@ -80,19 +88,22 @@ fn one_texture_on_different_shapes_becomes_two() {
 
 #[test]
 fn meshes_without_uv_have_barycentric_ones_where_textures_need_them() {
-    let ply = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n\
+    let ply = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+               element face 1\n\
                property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n";
     let obj = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
     let read = |file: &str, color: &str, text: &str| {
         let scene = format!(
-            r#"<scene version="3.0.0">{SENSOR}<shape type="{}"><string name="filename" value="{file}"/><bsdf type="diffuse">{color}</bsdf></shape></scene>"#,
+            r#"<scene version="3.0.0">{SENSOR}<shape type="{}"><string name="filename" value="{file}"/>
+            <bsdf type="diffuse">{color}</bsdf></shape></scene>"#,
             &file[2..]
         );
         read_with(&scene, &[], &[(file, text.as_bytes())]).unwrap()
     };
     let checker = r#"<texture type="checkerboard" name="reflectance"/>"#;
     // The v of OBJ files is one minus Mitsuba's.
-    let uvs = [("m.ply", ply, [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), ("m.obj", obj, [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]])];
+    let uvs =
+        [("m.ply", ply, [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), ("m.obj", obj, [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]])];
     for (file, text, corners) in uvs {
         let imported = read(file, checker, text);
         let desc = mesh(&imported.desc, 0);
@@ -100,7 +111,9 @@ fn meshes_without_uv_have_barycentric_ones_where_textures_need_them() {
         assert_eq!(data.uvs, Some(corners.repeat(2)), "{file}");
         assert_eq!((data.positions.len(), &data.triangles[1], desc.smooth_by), (6, &[3, 4, 5], SmoothByDesc::Position));
         assert_eq!(data.positions[3..], [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
-        assert!(imported.report.entries.iter().any(|entry| entry.parameter == "uv" && entry.outcome == Outcome::Mapped));
+        assert!(
+            imported.report.entries.iter().any(|entry| entry.parameter == "uv" && entry.outcome == Outcome::Mapped)
+        );
         let plain = read(file, "", text);
         assert_eq!((plain.assets.meshes.len(), mesh(&plain.desc, 0).file.as_deref()), (0, Some(file)));
     }
@@ -114,7 +127,8 @@ fn meshes_without_uv_have_barycentric_ones_where_textures_need_them() {
 fn checkers_keep_their_colours_where_v_is_turned_over() {
     let checker = |shape: &str, scale: &str| {
         let texture = format!(
-            r#"<texture type="checkerboard" name="reflectance"><float name="color0" value="0.1"/><float name="color1" value="0.9"/>
+            r#"<texture type="checkerboard" name="reflectance"><float name="color0" value="0.1"/>
+<float name="color1" value="0.9"/>
 <transform name="to_uv"><scale value="{scale}"/></transform></texture>"#
         );
         let desc = scene(&format!("<shape type=\"{shape}\"><bsdf type=\"diffuse\">{texture}</bsdf></shape>"));
@@ -134,8 +148,10 @@ fn checkers_keep_their_colours_where_v_is_turned_over() {
 #[test]
 fn spheres_and_cylinders_have_their_own_places() {
     let desc = scene(
-        r#"<shape type="sphere"><point name="center" x="1"/><float name="radius" value="2"/><transform name="to_world"><scale value="3"/></transform></shape>
-<shape type="cylinder"><point name="p0" value="1,0,0"/><point name="p1" value="1,0,5"/><float name="radius" value="0.5"/></shape>"#,
+        r#"<shape type="sphere"><point name="center" x="1"/><float name="radius" value="2"/><transform name="to_world">
+<scale value="3"/></transform></shape>
+<shape type="cylinder"><point name="p0" value="1,0,0"/><point name="p1" value="1,0,5"/>
+<float name="radius" value="0.5"/></shape>"#,
     );
     let ShapeDesc::Sphere(sphere) = shape(&desc, 0) else { panic!() };
     assert_eq!(sphere.radius, 2.0);
@@ -179,11 +195,14 @@ fn mirrored_shapes_are_inside_out_where_mitsubas_are() {
     assert!(!reversed(r#"<shape type="rectangle">MIRROR</shape>"#));
     assert!(!reversed(r#"<shape type="cube">MIRROR</shape>"#));
     assert!(reversed(
-        r#"<shape type="ply"><string name="filename" value="a.ply"/><boolean name="face_normals" value="true"/>MIRROR</shape>"#
+        r#"<shape type="ply"><string name="filename" value="a.ply"/>
+        <boolean name="face_normals" value="true"/>MIRROR</shape>"#
     ));
     let with = |header: &str| {
-        let text =
-            format!(r#"<scene version="3.0.0">{SENSOR}<shape type="ply"><string name="filename" value="a.ply"/>{mirror}</shape></scene>"#);
+        let text = format!(
+            r#"<scene version="3.0.0">{SENSOR}<shape type="ply"><string name="filename" value="a.ply"/>{mirror}</shape>
+            </scene>"#
+        );
         let imported = read_with(&text, &[], &[("a.ply", header.as_bytes())]).unwrap();
         imported.desc.shapes[0].common().reverse_normal
     };
@@ -194,8 +213,10 @@ fn mirrored_shapes_are_inside_out_where_mitsubas_are() {
 #[test]
 fn instances_place_groups() {
     let imported = try_scene(
-        r#"<shape type="shapegroup" id="g"><shape type="sphere"/><shape type="merge"><shape type="disk"/></shape></shape>
-<shape type="instance"><ref id="g"/><transform name="to_world"><translate x="3"/></transform></shape><shape type="instance" id="second"><ref id="g"/></shape>"#,
+        r#"<shape type="shapegroup" id="g"><shape type="sphere"/><shape type="merge">
+<shape type="disk"/></shape></shape>
+<shape type="instance"><ref id="g"/><transform name="to_world"><translate x="3"/></transform></shape>
+<shape type="instance" id="second"><ref id="g"/></shape>"#,
     )
     .unwrap();
     let desc = &imported.desc;

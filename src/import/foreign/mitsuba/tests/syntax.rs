@@ -10,7 +10,8 @@ fn sphere_radius(imported: &Imported) -> f64 {
 }
 
 const WITH_DEFAULT: &str = r#"<scene version="3.0.0"><default name="r" value="2"/><default name="r" value="3"/>
-<default name="kind" value="perspective"/><sensor type="$kind"/><shape type="sphere"><float name="radius" value="$r"/></shape></scene>"#;
+<default name="kind" value="perspective"/><sensor type="$kind"/><shape type="sphere">
+<float name="radius" value="$r"/></shape></scene>"#;
 
 #[test]
 fn the_first_default_counts_unless_the_user_defines_another_value() {
@@ -26,7 +27,10 @@ fn the_first_default_counts_unless_the_user_defines_another_value() {
 fn values_that_multiply_are_refused() {
     let mut text = "<scene version=\"3.0.0\"><default name=\"a0\" value=\"0123456789\"/>".to_owned();
     for i in 1..40 {
-        text += &format!("<default name=\"b{i}\" value=\"$a{0}$a{0}\"/><default name=\"a{i}\" value=\"$b{i}$b{i}\"/>", i - 1);
+        text += &format!(
+            "<default name=\"b{i}\" value=\"$a{0}$a{0}\"/><default name=\"a{i}\" value=\"$b{i}$b{i}\"/>",
+            i - 1
+        );
     }
     let error = read_with(&(text + "</scene>"), &[], &[]).unwrap_err();
     assert!(error.to_string().contains("too long"), "{error}");
@@ -59,7 +63,8 @@ fn files_that_include_themselves_are_an_error() {
 #[test]
 fn references_may_point_forward_and_have_other_names() {
     let desc = scene(
-        r#"<shape type="sphere"><ref id="later"/></shape><bsdf type="dielectric" id="later"/><alias id="later" as="other"/>
+        r#"<shape type="sphere"><ref id="later"/></shape><bsdf type="dielectric" id="later"/>
+        <alias id="later" as="other"/>
         <shape type="sphere"><ref id="other"/></shape>"#,
     );
     assert_eq!(shape(&desc, 0).common().material, Some("later"));
@@ -69,26 +74,40 @@ fn references_may_point_forward_and_have_other_names() {
 #[test]
 fn mistakes_have_a_place_and_a_suggestion() {
     let cases = [
-        ("\n<shape type=\"spere\"/>", "s.xml:3:1: Mitsuba has no shape of the type \"spere\" (did you mean \"sphere\"?)"),
+        (
+            "\n<shape type=\"spere\"/>",
+            "s.xml:3:1: Mitsuba has no shape of the type \"spere\" (did you mean \"sphere\"?)",
+        ),
         ("\n <shpae type=\"sphere\"/>", "s.xml:3:2: unknown element <shpae> (did you mean <shape>?)"),
         (
             "\n<shape type=\"sphere\"><ref id=\"gold\"/></shape><bsdf type=\"diffuse\" id=\"Gold\"/>",
             "s.xml:3:22: nothing has the id \"gold\" (did you mean \"Gold\"?)",
         ),
         ("\n<shape type=\"sphere\"><float name=\"radius\" value=\"x\"/></shape>", "s.xml:3:22: \"x\" is not a number"),
-        ("\n<shape type=\"sphere\"><string name=\"radius\" value=\"1\"/></shape>", "s.xml:3:22: \"radius\" must be a number"),
-        ("\n<bsdf type=\"diffuse\" id=\"a\"/><bsdf type=\"diffuse\" id=\"a\"/>", "s.xml:3:30: the id \"a\" is given twice"),
+        (
+            "\n<shape type=\"sphere\"><string name=\"radius\" value=\"1\"/></shape>",
+            "s.xml:3:22: \"radius\" must be a number",
+        ),
+        (
+            "\n<bsdf type=\"diffuse\" id=\"a\"/><bsdf type=\"diffuse\" id=\"a\"/>",
+            "s.xml:3:30: the id \"a\" is given twice",
+        ),
         (
             "\n<shape type=\"sphere\"><float name=\"radius\" value=\"1\"/><float name=\"radius\" value=\"1\"/></shape>",
             "\"radius\" is given twice",
         ),
-        ("\n<shape type=\"sphere\"><transform name=\"to_world\"><tarnslate x=\"1\"/></transform></shape>", "did you mean <translate>?"),
         (
-            "\n<shape type=\"sphere\"><bsdf type=\"roughdielectric\"><string name=\"int_ior\" value=\"dimond\"/></bsdf></shape>",
+            "\n<shape type=\"sphere\"><transform name=\"to_world\"><tarnslate x=\"1\"/></transform></shape>",
+            "did you mean <translate>?",
+        ),
+        (
+            "\n<shape type=\"sphere\"><bsdf type=\"roughdielectric\">\
+             <string name=\"int_ior\" value=\"dimond\"/></bsdf></shape>",
             "did you mean \"diamond\"?",
         ),
         (
-            "\n<shape type=\"sphere\"><bsdf type=\"conductor\"><string name=\"material\" value=\"Agg\"/></bsdf></shape>",
+            "\n<shape type=\"sphere\"><bsdf type=\"conductor\">\
+             <string name=\"material\" value=\"Agg\"/></bsdf></shape>",
             "no material named \"Agg\"",
         ),
         ("\n<shape type=\"sphere\">text</shape>", "s.xml:3:22: text outside of elements"),
@@ -114,7 +133,8 @@ fn what_refers_to_itself_is_an_error() {
     let mut doubled = "<bsdf type=\"diffuse\" id=\"b0\"/><shape type=\"disk\"><ref id=\"b60\"/></shape>".to_owned();
     for i in 1..=60 {
         doubled += &format!(
-            "<bsdf type=\"blendbsdf\" id=\"b{i}\"><float name=\"weight\" value=\"0.5\"/><ref id=\"b{0}\"/><ref id=\"b{0}\"/></bsdf>",
+            "<bsdf type=\"blendbsdf\" id=\"b{i}\"><float name=\"weight\" value=\"0.5\"/><ref id=\"b{0}\"/>\
+             <ref id=\"b{0}\"/></bsdf>",
             i - 1
         );
     }
@@ -123,7 +143,9 @@ fn what_refers_to_itself_is_an_error() {
 
 #[test]
 fn damaged_texts_are_errors() {
-    let whole = format!("<scene version=\"3.0.0\">{SENSOR}<shape type=\"sphere\"><float name=\"radius\" value=\"2\"/></shape></scene>");
+    let whole = format!(
+        "<scene version=\"3.0.0\">{SENSOR}<shape type=\"sphere\"><float name=\"radius\" value=\"2\"/></shape></scene>"
+    );
     assert!(read_with(&whole, &[], &[]).is_ok());
     for end in 0..whole.len() {
         let error = read_with(&whole[..end], &[], &[]).unwrap_err().to_string();
@@ -131,7 +153,8 @@ fn damaged_texts_are_errors() {
     }
     let deep = format!("<scene version=\"3.0.0\">{}", "<shape type=\"merge\">".repeat(100_000));
     assert!(read_with(&deep, &[], &[]).is_err());
-    let closed = format!("<scene version=\"3.0.0\">{}{}</scene>", "<shape type=\"merge\">".repeat(500), "</shape>".repeat(500));
+    let closed =
+        format!("<scene version=\"3.0.0\">{}{}</scene>", "<shape type=\"merge\">".repeat(500), "</shape>".repeat(500));
     let error = read_with(&closed, &[], &[]).unwrap_err().to_string();
     assert!(error.contains("nested more than") || error.contains("not valid XML"), "{error}");
     let many = format!("<scene version=\"3.0.0\">{}</scene>", "<a/>".repeat(10_000));
@@ -142,7 +165,8 @@ fn damaged_texts_are_errors() {
 
 #[test]
 fn names_of_old_versions_are_understood() {
-    let text = r#"<scene version="0.6.0"><sensor type="perspective"><string name="fovAxis" value="y"/><float name="fov" value="30"/>
+    let text = r#"<scene version="0.6.0"><sensor type="perspective"><string name="fovAxis" value="y"/>
+<float name="fov" value="30"/>
 <transform name="toWorld"><lookAt origin="0,0,5" target="0,0,0" up="0,1,0"/></transform></sensor></scene>"#;
     let desc = read_with(text, &[], &[]).unwrap().desc;
     assert_near(desc.camera.vertical_fov_degrees.unwrap(), 30.0);
@@ -150,8 +174,8 @@ fn names_of_old_versions_are_understood() {
 
 #[test]
 fn nothing_is_dropped_in_silence() {
-    let unknown =
-        r#"<shape type="sphere"><float name="colour" value="1"/><bsdf type="diffuse"><float name="shine" value="1"/></bsdf></shape>"#;
+    let unknown = r#"<shape type="sphere"><float name="colour" value="1"/><bsdf type="diffuse">
+        <float name="shine" value="1"/></bsdf></shape>"#;
     let names: Vec<String> = notes(unknown).into_iter().map(|(_, name, _)| name).collect();
     assert_eq!(names, ["shine", "colour"]);
     let lacking = r#"<shape type="sdfgrid"/><medium type="homogeneous"/><emitter type="timed_sunsky"/>
@@ -185,7 +209,10 @@ fn elements_have_a_bounded_number_of_attributes() {
         let file = folder.path().join("s.xml");
         std::fs::write(
             &file,
-            format!("<!-- {} -->\n<scene version=\"3.0.0\">\n<default name=\"a\" value=\"b\"{attributes}/></scene>", "= ".repeat(500)),
+            format!(
+                "<!-- {} -->\n<scene version=\"3.0.0\">\n<default name=\"a\" value=\"b\"{attributes}/></scene>",
+                "= ".repeat(500)
+            ),
         )
         .unwrap();
         super::super::xml::read(&file, &[]).map(|_| ()).map_err(|e| e.to_string())

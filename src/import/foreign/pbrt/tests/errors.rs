@@ -40,7 +40,8 @@ fn errors_have_a_line_and_a_column() {
 fn files_that_include_each_other_end() {
     let error = read_with("Include \"s.pbrt\"", &[]).unwrap_err();
     assert!(error.to_string().contains("too many files"), "{error}");
-    let error = read_with("Include \"a\"", &[("a", b"Include \"b\" Include \"b\""), ("b", b"Include \"a\"")]).unwrap_err();
+    let error =
+        read_with("Include \"a\"", &[("a", b"Include \"b\" Include \"b\""), ("b", b"Include \"a\"")]).unwrap_err();
     assert!(error.to_string().contains("too many files"), "{error}");
     let error = read_with("Include \"none.pbrt\" WorldBegin", &[]).unwrap_err();
     assert!(matches!(&error, Error::Missing { file, .. } if file.ends_with("none.pbrt")), "{error}");
@@ -48,7 +49,8 @@ fn files_that_include_each_other_end() {
 
 #[test]
 fn included_files_go_on_where_the_first_stands() {
-    let imported = read_with("WorldBegin Include \"a.pbrt\" Shape \"sphere\"", &[("a.pbrt", b"Translate 0 2 0")]).unwrap();
+    let imported =
+        read_with("WorldBegin Include \"a.pbrt\" Shape \"sphere\"", &[("a.pbrt", b"Translate 0 2 0")]).unwrap();
     assert_eq!(map(shape(&imported).common().transform).translation.y, 2.0);
     let error = read_with("WorldBegin Include \"a.pbrt\"", &[("a.pbrt", b"\nShap")]).unwrap_err();
     assert!(matches!(&error, Error::Parse { file, line: 2, .. } if file.ends_with("a.pbrt")), "{error}");
@@ -77,7 +79,9 @@ fn spectra_come_from_files() {
     let text = "WorldBegin Material \"diffuse\" \"spectrum reflectance\" \"a.spd\" Shape \"sphere\"";
     let imported = read_with(text, &[("a.spd", b"# grey\n300 0.25\n900 0.25 # end\n")]).unwrap();
     let name = shape(&imported).common().material.unwrap();
-    let crate::desc::MaterialDesc::Diffuse { albedo: crate::desc::ColorDesc::Rgb(color), .. } = &imported.desc.materials[name] else {
+    let crate::desc::MaterialDesc::Diffuse { albedo: crate::desc::ColorDesc::Rgb(color), .. } =
+        &imported.desc.materials[name]
+    else {
         panic!()
     };
     assert!(close(*color, [0.25; 3]), "{color:?}");
@@ -87,7 +91,8 @@ fn spectra_come_from_files() {
 fn the_report_lists_the_outcome_of_each_parameter() {
     let imported = world(
         "Material \"coateddiffuse\" \"rgb reflectance\" [1 2 0.5] \"float thickness\" 0.1 \"float madeup\" 1
-         Shape \"sphere\" \"float radius\" 2 Shape \"curve\" Shape \"plymesh\" \"string filename\" \"a.ply\" \"float edgelength\" 1",
+         Shape \"sphere\" \"float radius\" 2 Shape \"curve\"
+         Shape \"plymesh\" \"string filename\" \"a.ply\" \"float edgelength\" 1",
     );
     assert_eq!(outcome(&imported, "Shape sphere", "radius"), Outcome::Mapped);
     assert_eq!(outcome(&imported, "Material", "reflectance"), Outcome::Approximated);

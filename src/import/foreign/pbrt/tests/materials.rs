@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::desc::{
-    ChannelDesc, ColorDesc, ColorSpaceDesc, LightDesc, MaterialDesc, OpacityDesc, RangedDesc, RoughnessDesc, ScalarDesc, TextureDesc,
+    ChannelDesc, ColorDesc, ColorSpaceDesc, LightDesc, MaterialDesc, OpacityDesc, RangedDesc, RoughnessDesc,
+    ScalarDesc, TextureDesc,
 };
 
 /// The material of a scene with one sphere of it.
@@ -30,7 +31,8 @@ fn an_rgb_light_of_one_is_a_pixel_of_one_at_any_unit_exposure() {
 fn spectra_of_light_have_luminance_one() {
     let luminance = |[r, g, b]: [f32; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
     for spectrum in ["\"blackbody L\" 3000", "\"spectrum L\" [300 7 800 7]", "\"spectrum L\" \"stdillum-A\"", ""] {
-        let color = emission(&format!("WorldBegin AreaLightSource \"diffuse\" {spectrum} \"float scale\" 5 Shape \"sphere\""));
+        let color =
+            emission(&format!("WorldBegin AreaLightSource \"diffuse\" {spectrum} \"float scale\" 5 Shape \"sphere\""));
         assert!((luminance(color) - 5.0).abs() < 0.02, "{spectrum}: {color:?}");
     }
     assert_eq!(emission("WorldBegin AreaLightSource \"diffuse\" Shape \"sphere\""), [1.0; 3]);
@@ -40,10 +42,12 @@ fn spectra_of_light_have_luminance_one() {
 fn power_is_that_of_each_shape() {
     let pi = std::f32::consts::PI;
     // A sphere of radius 2 has an area of 16 pi.
-    let sphere = emission("WorldBegin AreaLightSource \"diffuse\" \"float power\" 10 Shape \"sphere\" \"float radius\" 2");
+    let sphere =
+        emission("WorldBegin AreaLightSource \"diffuse\" \"float power\" 10 Shape \"sphere\" \"float radius\" 2");
     assert!(close(sphere, [10.0 / (16.0 * pi * pi); 3]), "{sphere:?}");
     let quad = "Shape \"bilinearmesh\" \"point3 P\" [0 0 0 2 0 0 0 2 0 2 2 0]";
-    let both = emission(&format!("WorldBegin AreaLightSource \"diffuse\" \"float power\" 10 \"bool twosided\" true {quad}"));
+    let both =
+        emission(&format!("WorldBegin AreaLightSource \"diffuse\" \"float power\" 10 \"bool twosided\" true {quad}"));
     // One patch of area 4 with two sides, though it is two triangles of ours.
     assert!(close(both, [10.0 / (2.0 * pi * 4.0); 3]), "{both:?}");
     let triangles = "Shape \"trianglemesh\" \"point3 P\" [0 0 0 2 0 0 0 2 0 2 2 0] \"integer indices\" [0 1 2 2 1 3]";
@@ -55,7 +59,8 @@ fn power_is_that_of_each_shape() {
 fn lights_without_shape_have_their_power() {
     let pi = std::f32::consts::PI;
     let lights = world(
-        "LightSource \"point\" \"float power\" 8 LightSource \"spot\" \"float power\" 8 \"float coneangle\" 60 \"float conedeltaangle\" 60",
+        "LightSource \"point\" \"float power\" 8 LightSource \"spot\" \"float power\" 8 \"float coneangle\" 60 \
+         \"float conedeltaangle\" 60",
     )
     .desc
     .lights;
@@ -64,8 +69,11 @@ fn lights_without_shape_have_their_power() {
     // From the axis to 60 degrees: half of 1 - 1/2.
     assert!(close(spot.intensity, [8.0 / (2.0 * pi * 0.25); 3]), "{spot:?}");
     assert_eq!((spot.cutoff_angle_degrees, spot.beam_angle_degrees), (60.0, Some(0.0)));
-    let lights =
-        world("LightSource \"infinite\" \"float illuminance\" 6 LightSource \"infinite\" \"rgb L\" [1 2 3] \"float scale\" 2").desc.lights;
+    let lights = world(
+        "LightSource \"infinite\" \"float illuminance\" 6 LightSource \"infinite\" \"rgb L\" [1 2 3] \"float scale\" 2",
+    )
+    .desc
+    .lights;
     let (LightDesc::Environment(a), LightDesc::Environment(b)) = (&lights[0], &lights[1]) else { panic!() };
     assert!(close(a.radiance.unwrap(), [6.0 / pi; 3]) && b.radiance == Some([2.0, 4.0, 6.0]));
 }
@@ -78,11 +86,17 @@ fn alpha_is_the_root_of_the_roughness_unless_it_is_not_remapped() {
     };
     assert!(alpha("").is_none());
     assert!(matches!(alpha("\"float roughness\" 0.25"), Some(RoughnessDesc::Isotropic(a)) if a == 0.5));
-    assert!(matches!(alpha("\"float roughness\" 0.25 \"bool remaproughness\" false"), Some(RoughnessDesc::Isotropic(a)) if a == 0.25));
+    assert!(matches!(
+        alpha("\"float roughness\" 0.25 \"bool remaproughness\" false"),
+        Some(RoughnessDesc::Isotropic(a)) if a == 0.25
+    ));
     let uneven = alpha("\"float uroughness\" 0.25 \"float vroughness\" 0.04");
     assert!(matches!(uneven, Some(RoughnessDesc::Anisotropic([u, v])) if u == 0.5 && v == 0.2));
-    let textured = "Texture \"t\" \"float\" \"checkerboard\" Material \"conductor\" \"texture uroughness\" \"t\" \"float vroughness\" 0.04";
-    let MaterialDesc::Conductor { alpha: Some(RoughnessDesc::Axes { u, v }), .. } = material(textured) else { panic!() };
+    let textured = "Texture \"t\" \"float\" \"checkerboard\" Material \"conductor\" \"texture uroughness\" \"t\" \
+                    \"float vroughness\" 0.04";
+    let MaterialDesc::Conductor { alpha: Some(RoughnessDesc::Axes { u, v }), .. } = material(textured) else {
+        panic!()
+    };
     assert!(matches!((u, v), (ScalarDesc::Texture { .. }, ScalarDesc::Constant(v)) if (v - 0.2).abs() < 1e-6));
     // Smooth below 0.001, of alpha.
     assert!(alpha("\"float roughness\" 0.0009 \"bool remaproughness\" false").is_none());
@@ -93,7 +107,10 @@ fn alpha_is_the_root_of_the_roughness_unless_it_is_not_remapped() {
 fn metals_are_copper_or_what_they_reflect() {
     let MaterialDesc::Conductor { eta, .. } = material("Material \"conductor\"") else { panic!() };
     assert_eq!(eta, Some([0.1337, 0.9552, 1.2142]));
-    let MaterialDesc::Conductor { eta, k, .. } = material("Material \"conductor\" \"rgb reflectance\" [0.5 0.25 0]") else { panic!() };
+    let MaterialDesc::Conductor { eta, k, .. } = material("Material \"conductor\" \"rgb reflectance\" [0.5 0.25 0]")
+    else {
+        panic!()
+    };
     for (eta, (k, expected)) in eta.unwrap().into_iter().zip(k.unwrap().into_iter().zip([0.5, 0.25, 0.0f32])) {
         let reflectance = ((eta - 1.0).powi(2) + k * k) / ((eta + 1.0).powi(2) + k * k);
         assert!((reflectance - expected).abs() < 1e-6);
@@ -103,8 +120,12 @@ fn metals_are_copper_or_what_they_reflect() {
 #[test]
 fn glass_has_an_index_by_number_or_by_name() {
     let MaterialDesc::Dielectric(glass) = material("Material \"dielectric\" \"float eta\" 1.3") else { panic!() };
-    assert!(matches!(glass.ior, RangedDesc::Constant(ior) if ior == 1.3) && glass.abbe.is_none() && !glass.multiscatter);
-    let MaterialDesc::Dielectric(glass) = material("Material \"dielectric\" \"spectrum eta\" \"glass-BK7\"") else { panic!() };
+    assert!(
+        matches!(glass.ior, RangedDesc::Constant(ior) if ior == 1.3) && glass.abbe.is_none() && !glass.multiscatter
+    );
+    let MaterialDesc::Dielectric(glass) = material("Material \"dielectric\" \"spectrum eta\" \"glass-BK7\"") else {
+        panic!()
+    };
     assert!(matches!(glass.ior, RangedDesc::Constant(ior) if ior == 1.5168) && glass.abbe == Some(64.17));
 }
 
@@ -126,10 +147,15 @@ fn colours_below_coats_deepen() {
 #[test]
 fn coated_metals_are_two_materials() {
     let imported = world(
-        "Material \"coatedconductor\" \"spectrum conductor.eta\" \"metal-Al-eta\" \"float interface.roughness\" 0.04 Shape \"sphere\"",
+        "Material \"coatedconductor\" \"spectrum conductor.eta\" \"metal-Al-eta\" \"float interface.roughness\" 0.04 \
+         Shape \"sphere\"",
     );
     let name = shape(&imported).common().material.unwrap();
-    let MaterialDesc::Coated { base, alpha: Some(RoughnessDesc::Isotropic(alpha)), .. } = &imported.desc.materials[name] else { panic!() };
+    let MaterialDesc::Coated { base, alpha: Some(RoughnessDesc::Isotropic(alpha)), .. } =
+        &imported.desc.materials[name]
+    else {
+        panic!()
+    };
     assert_eq!(*alpha, 0.2);
     let MaterialDesc::Conductor { eta: Some(eta), .. } = &imported.desc.materials[base] else { panic!() };
     assert!((eta[0] - 1.4286 / 1.5).abs() < 1e-6);
@@ -142,14 +168,20 @@ fn mixes_name_their_parts_and_interfaces_vanish() {
          MakeNamedMaterial \"m\" \"string type\" \"mix\" \"string materials\" [\"a\" \"b\"] \"float amount\" 0.25
          NamedMaterial \"m\" Shape \"sphere\" Material \"interface\" Shape \"sphere\"",
     );
-    let MaterialDesc::Mix { materials, .. } = &imported.desc.materials[shape(&imported).common().material.unwrap()] else { panic!() };
+    let MaterialDesc::Mix { materials, .. } = &imported.desc.materials[shape(&imported).common().material.unwrap()]
+    else {
+        panic!()
+    };
     assert_eq!(materials, &["a", "b"]);
 }
 
 #[test]
 fn diffuse_transmission_gains_no_light() {
-    let text = "Material \"diffusetransmission\" \"rgb reflectance\" [0.8 0 0] \"rgb transmittance\" [0.8 0.1 0] \"float scale\" 1";
-    let MaterialDesc::DiffuseTransmission { reflectance: ColorDesc::Rgb(r), transmittance: ColorDesc::Rgb(t) } = material(text) else {
+    let text = "Material \"diffusetransmission\" \"rgb reflectance\" [0.8 0 0] \"rgb transmittance\" [0.8 0.1 0] \
+                \"float scale\" 1";
+    let MaterialDesc::DiffuseTransmission { reflectance: ColorDesc::Rgb(r), transmittance: ColorDesc::Rgb(t) } =
+        material(text)
+    else {
         panic!()
     };
     assert!(close(r, [0.5, 0.0, 0.0]) && close(t, [0.5, 0.0625, 0.0]));
@@ -165,7 +197,9 @@ fn textures_keep_their_two_kinds_apart() {
          Shape \"sphere\" \"texture alpha\" \"t\"",
     );
     let common = shape(&imported).common();
-    let MaterialDesc::Diffuse { albedo: ColorDesc::Texture { texture }, .. } = &imported.desc.materials[common.material.unwrap()] else {
+    let MaterialDesc::Diffuse { albedo: ColorDesc::Texture { texture }, .. } =
+        &imported.desc.materials[common.material.unwrap()]
+    else {
         panic!()
     };
     let TextureDesc::Product { factors } = &imported.desc.textures[texture] else { panic!() };
@@ -205,7 +239,8 @@ fn constants_are_folded() {
 
 #[test]
 fn a_square_of_the_checkerboard_is_one_unit_wide() {
-    let text = "Texture \"c\" \"spectrum\" \"checkerboard\" \"float uscale\" 8 \"float vscale\" 4 \"rgb tex1\" [1 0 0] \"rgb tex2\" [0 1 0]
+    let text = "Texture \"c\" \"spectrum\" \"checkerboard\" \"float uscale\" 8 \"float vscale\" 4
+        \"rgb tex1\" [1 0 0] \"rgb tex2\" [0 1 0]
         Material \"diffuse\" \"texture reflectance\" \"c\" Shape \"sphere\"";
     let TextureDesc::Checker { color0, color1, scale } = world(text).desc.textures["c"].clone() else { panic!() };
     assert_eq!((color0, color1, scale), ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [4.0, 2.0]));
@@ -240,7 +275,8 @@ fn skies_are_turned_with_their_transform() {
         pfm.extend([value; 3].iter().flat_map(|x| x.to_le_bytes()));
     }
     let imported = read_with(
-        "Scale -1 1 1 Camera \"perspective\" WorldBegin LightSource \"infinite\" \"string filename\" \"sky.pfm\" \"float scale\" 2",
+        "Scale -1 1 1 Camera \"perspective\" WorldBegin LightSource \"infinite\" \"string filename\" \"sky.pfm\" \
+         \"float scale\" 2",
         &[("sky.pfm", &pfm)],
     )
     .unwrap();

@@ -58,12 +58,16 @@ fn the_screen_window_shifts_and_stretches() {
     assert_eq!((camera.pixel_aspect, camera.vertical_fov_degrees), (None, Some(90.0)));
     let imported = read(&format!("{film} Camera \"orthographic\" \"float screenwindow\" [-4 4 -1 1] WorldBegin"));
     let camera = &imported.desc.camera;
-    assert_eq!((camera.kind, camera.view_height, camera.pixel_aspect), (CameraKindDesc::Orthographic, Some(2.0), Some(4.0)));
+    assert_eq!(
+        (camera.kind, camera.view_height, camera.pixel_aspect),
+        (CameraKindDesc::Orthographic, Some(2.0), Some(4.0))
+    );
 }
 
 #[test]
 fn the_scale_of_the_camera_is_that_of_its_lens() {
-    let imported = read("Scale 2 2 2 Camera \"perspective\" \"float lensradius\" 1 \"float focaldistance\" 6 WorldBegin");
+    let imported =
+        read("Scale 2 2 2 Camera \"perspective\" \"float lensradius\" 1 \"float focaldistance\" 6 WorldBegin");
     let lens = imported.desc.camera.lens.unwrap();
     assert!((lens.radius.unwrap() - 0.5).abs() < 1e-12 && (lens.focus_distance.unwrap() - 3.0).abs() < 1e-12);
 }
@@ -87,15 +91,18 @@ fn transforms_act_in_pbrts_order() {
     assert_eq!(m.transform_point3(DVec3::ONE), DVec3::new(-3.0, 4.0, 5.0));
     let m = of("Rotate 90 0 0 1 Shape \"sphere\"");
     assert!((m.transform_point3(DVec3::X) - DVec3::Y).length() < 1e-12);
-    let m = of("Transform [2 0 0 0  0 1 0 0  0 0 1 0  5 6 7 1] ConcatTransform [1 0 0 0 0 1 0 0 0 0 1 0 1 0 0 1] Shape \"sphere\"");
+    let m = of("Transform [2 0 0 0  0 1 0 0  0 0 1 0  5 6 7 1] \
+                ConcatTransform [1 0 0 0 0 1 0 0 0 0 1 0 1 0 0 1] Shape \"sphere\"");
     assert_eq!(m.transform_point3(DVec3::ZERO), DVec3::new(-7.0, 6.0, 7.0));
     let m = of("AttributeBegin Translate 9 9 9 AttributeEnd TransformBegin Scale 3 3 3 TransformEnd Shape \"sphere\"");
     assert_eq!(m.translation, DVec3::ZERO);
     let m = of("Translate 1 0 0 CoordinateSystem \"here\" Identity CoordSysTransform \"here\" Shape \"sphere\"");
     assert_eq!(m.translation, DVec3::new(-1.0, 0.0, 0.0));
     // The camera's own system: 5 in front of the camera.
-    let imported =
-        read("LookAt 0 0 -5 0 0 0 0 1 0 Camera \"perspective\" WorldBegin CoordSysTransform \"camera\" Translate 0 0 5 Shape \"sphere\"");
+    let imported = read(
+        "LookAt 0 0 -5 0 0 0 0 1 0 Camera \"perspective\" WorldBegin CoordSysTransform \"camera\" Translate 0 0 5 \
+         Shape \"sphere\"",
+    );
     assert!(map(shape(&imported).common().transform).translation.length() < 1e-12);
 }
 
@@ -115,7 +122,8 @@ fn fronts_of_quadrics_follow_reverse_orientation_and_handedness() {
 
 #[test]
 fn normals_turn_triangles() {
-    let text = "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1 2] \"normal N\" [0 0 -1 0 0 -1 0 0 -1]";
+    let text = "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1 2] \
+                \"normal N\" [0 0 -1 0 0 -1 0 0 -1]";
     let imported = world(text);
     let ShapeDesc::Mesh(mesh) = shape(&imported) else { panic!() };
     assert_eq!(mesh.triangles.as_ref().unwrap(), &[[0, 2, 1]]);
@@ -130,7 +138,9 @@ fn moving_things_have_keyframes_without_a_mirror() {
     assert_eq!(end.transform_point3(DVec3::ONE), DVec3::new(-3.0, 1.0, 1.0));
     assert!(common.motion.iter().all(|keyframe| map(&keyframe.transform).matrix3.determinant() > 0.0));
     let imported = world("ActiveTransform EndTime Scale 2 2 2 ActiveTransform All Scale -1 1 1 Shape \"sphere\"");
-    assert!(shape(&imported).common().motion.iter().all(|keyframe| map(&keyframe.transform).matrix3.determinant() > 0.0));
+    assert!(
+        shape(&imported).common().motion.iter().all(|keyframe| map(&keyframe.transform).matrix3.determinant() > 0.0)
+    );
 }
 
 #[test]
@@ -153,7 +163,10 @@ fn parts_of_quadrics_are_ours() {
         (serde_json::to_value(shape).unwrap(), map(shape.common().transform).translation.z)
     };
     let (sphere, _) = of("Shape \"sphere\" \"float radius\" 2 \"float zmin\" -1 \"float zmax\" 5 \"float phimax\" 90");
-    assert_eq!((&sphere["z_min"], &sphere["z_max"], &sphere["phi_max_degrees"]), (&(-1.0).into(), &serde_json::Value::Null, &90.0.into()));
+    assert_eq!(
+        (&sphere["z_min"], &sphere["z_max"], &sphere["phi_max_degrees"]),
+        (&(-1.0).into(), &serde_json::Value::Null, &90.0.into())
+    );
     let (cylinder, z) = of("Shape \"cylinder\" \"float zmin\" 1 \"float zmax\" 4");
     assert_eq!((&cylinder["height"], z), (&3.0.into(), 1.0));
     let (disk, z) = of("Shape \"disk\" \"float height\" 2 \"float innerradius\" 0.5");
@@ -181,7 +194,8 @@ fn options_are_pbrts_defaults_and_values() {
     assert!(matches!(film.integrator, IntegratorDesc::Path { max_depth: 6, .. }));
     let text = "Integrator \"path\" \"integer maxdepth\" 0 Sampler \"halton\" \"integer pixelsamples\" 7
         PixelFilter \"triangle\" \"float xradius\" 1 \"float yradius\" 1
-        Film \"rgb\" \"integer xresolution\" 100 \"integer yresolution\" 50 \"float cropwindow\" [0.1 0.5 0.5 1] \"string filename\" \"a.exr\"
+        Film \"rgb\" \"integer xresolution\" 100 \"integer yresolution\" 50 \"float cropwindow\" [0.1 0.5 0.5 1]
+        \"string filename\" \"a.exr\"
         WorldBegin";
     let desc = read(text).desc;
     assert!(matches!(desc.integrator, IntegratorDesc::Path { max_depth: 1, .. }));
@@ -196,7 +210,8 @@ fn samplers_and_what_changes_the_noise_alone_are_mapped_with_a_note() {
         Integrator \"path\" \"string lightsampler\" \"power\" WorldBegin",
     );
     assert!(imported.report.is_exact());
-    let notes: Vec<_> = imported.report.entries.iter().map(|entry| (entry.parameter.as_str(), entry.note.as_str())).collect();
+    let notes: Vec<_> =
+        imported.report.entries.iter().map(|entry| (entry.parameter.as_str(), entry.note.as_str())).collect();
     assert!(notes.iter().any(|(name, note)| name.is_empty() && note.contains("--sampler independent")), "{notes:?}");
     assert!(notes.contains(&("lightsampler", "it changes the noise only")), "{notes:?}");
     assert!(notes.iter().any(|(name, note)| *name == "randomization" && note.contains("Owen")), "{notes:?}");
@@ -204,7 +219,8 @@ fn samplers_and_what_changes_the_noise_alone_are_mapped_with_a_note() {
 
 #[test]
 fn lights_stand_in_the_mirrored_world() {
-    let imported = world("Translate 1 0 0 LightSource \"point\" \"point3 from\" [1 2 3] \"rgb I\" [1 2 3] \"float scale\" 2");
+    let imported =
+        world("Translate 1 0 0 LightSource \"point\" \"point3 from\" [1 2 3] \"rgb I\" [1 2 3] \"float scale\" 2");
     let LightDesc::Point(light) = &imported.desc.lights[0] else { panic!() };
     assert_eq!((light.position, light.intensity), ([-2.0, 2.0, 3.0], [2.0, 4.0, 6.0]));
     let imported = world("LightSource \"distant\" \"point3 from\" [1 1 0] \"point3 to\" [0 0 0] \"rgb L\" [3 3 3]");
@@ -215,6 +231,8 @@ fn lights_stand_in_the_mirrored_world() {
 #[test]
 fn byte_order_marks_are_passed_over() {
     let included = "\u{feff}Shape \"sphere\"\n";
-    let scene = read_with("\u{feff}WorldBegin\nInclude \"a.pbrt\"\nShape \"disk\"\n", &[("a.pbrt", included.as_bytes())]).unwrap();
+    let scene =
+        read_with("\u{feff}WorldBegin\nInclude \"a.pbrt\"\nShape \"disk\"\n", &[("a.pbrt", included.as_bytes())])
+            .unwrap();
     assert_eq!(scene.desc.shapes.len(), 2);
 }
