@@ -54,7 +54,7 @@ fn room() -> Value {
 
 /// A room with a lamp at the bottom of a shaft, which lights nothing but a spot of the ceiling: only paths that happen
 /// to meet it contribute.
-fn room_with_shaft() -> Value {
+pub fn room_with_shaft() -> Value {
     let (bottom, height, half) = (0.4, 1.1, 0.15);
     let wall = |x: f64, z: f64, along: [f64; 3]| quad("black", [x, bottom, z], along, [0.0, height, 0.0]);
     json!({

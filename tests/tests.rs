@@ -115,6 +115,7 @@ mod texture_filtering;
 mod textures;
 /// Layers, lengths of files and functions, parameters, public names, unsafe code, printing.
 mod tidy;
+mod trained_guides;
 /// What files may do: set what a picture is, but load, overwrite and connect to nothing.
 mod trust;
 /// Shared helpers.

@@ -173,6 +173,12 @@ impl Guide {
         self.learns = learns;
     }
 
+    /// The guide without its records, which takes no further ones.
+    #[must_use]
+    pub fn into_trained(self) -> Self {
+        Self { leaves: Vec::new(), learns: false, ..self }
+    }
+
     /// What is known of the light at a surface whose normal, on the side of the path, is `n`; `None` if nothing.
     #[inline]
     pub fn at(&self, p: Vec3, n: Vec3) -> Option<GuideRegion<'_>> {

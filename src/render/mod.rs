@@ -13,6 +13,7 @@ mod provenance;
 mod settings;
 mod state;
 mod tile_renderer;
+mod trained_guide;
 
 pub use driver::RenderSession;
 pub use exr_overrides::ExrOverrides;
@@ -21,6 +22,7 @@ pub use progress::{Progress, Silent};
 pub use provenance::{RenderProvenance, SequenceFrame};
 pub use settings::{DEFAULT_EXTENSIONS, Settings, threads};
 pub use state::{Checkpoints, Header, Merged, RenderState, Shard, StateFile, check_kept, merge};
+pub use trained_guide::TrainedGuide;
 
 use std::sync::atomic::AtomicBool;
 
@@ -155,7 +157,8 @@ pub fn replay(
     }
     if settings.is_guided() {
         return Err(Error::Usage(
-            "--pixel: with guiding, a sample depends on all that were before; replay it with --guiding off".into(),
+            "--pixel: with guiding, a sample depends on all that were before; replay it with --guiding off or --guide"
+                .into(),
         ));
     }
     let renderer = TileRenderer::new(scene, accel, settings);

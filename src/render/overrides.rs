@@ -1,6 +1,6 @@
 //! What the command line changes about a render.
 
-use super::ExrOverrides;
+use super::{ExrOverrides, TrainedGuide};
 use crate::accel::AccelKind;
 use crate::desc::{IntegratorDesc, LayerKind, SamplerKindDesc, StrategyDesc, ViewDesc};
 
@@ -41,6 +41,8 @@ pub struct Overrides {
     pub regularize: Option<f32>,
     /// `--guiding`.
     pub guiding: Option<bool>,
+    /// `--guide`: paths are guided by it, and do not train it.
+    pub guide: Option<TrainedGuide>,
     /// `--time-limit`, in seconds.
     pub time_limit: Option<f64>,
     /// `--output`: these files in place of the scene's.

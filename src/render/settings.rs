@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::Overrides;
+use super::{Overrides, TrainedGuide};
 use crate::accel::AccelKind;
 use crate::desc::{FilterDesc, IntegratorDesc, MAX_SIDE, OutputDesc, PixelTypeDesc, SceneDesc, ViewDesc};
 use crate::error::{Error, Result};
@@ -50,6 +50,9 @@ pub struct Settings {
     pub seed: u64,
     /// The algorithm.
     pub integrator: IntegratorDesc,
+    /// What guides paths, if a guide was trained before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub guide: Option<TrainedGuide>,
     /// What finds hits.
     pub accel: AccelKind,
     /// Whether the camera's lens blurs what is out of focus; if not,
@@ -97,6 +100,7 @@ impl Settings {
             target_error: target_error(overrides)?,
             seed: overrides.seed.unwrap_or(desc.sampler.seed),
             integrator,
+            guide: overrides.guide.clone(),
             accel: overrides.accel.unwrap_or_default(),
             depth_of_field: !overrides.no_depth_of_field,
             threads: threads(overrides.threads)?,
@@ -106,7 +110,7 @@ impl Settings {
         })
     }
 
-    /// Whether paths are guided: a sample then depends on all that were before.
+    /// Whether paths train a guide: a sample then depends on all that were before.
     pub fn is_guided(&self) -> bool {
         matches!(self.integrator, IntegratorDesc::Path { guiding: true, .. })
     }
@@ -222,9 +226,16 @@ fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc>
         };
         *guiding = enabled;
     }
+    if overrides.guide.is_some() {
+        let IntegratorDesc::Path { guiding, .. } = &mut integrator else {
+            return Err(usage("--guide: only the integrator path can be guided"));
+        };
+        // The guide is not trained further, whatever the scene says.
+        *guiding = false;
+    }
     if matches!(integrator, IntegratorDesc::Path { guiding: true, .. }) && overrides.target_error.is_some() {
         return Err(usage(
-            "--target-error: not with guiding; give --guiding off, or --spp or --time-limit in its place",
+            "--target-error: not with guiding; give --guide, --guiding off, or --spp or --time-limit in its place",
         ));
     }
     Ok(integrator)

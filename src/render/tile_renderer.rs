@@ -32,6 +32,8 @@ pub(super) struct TileRenderer<'a> {
     view: [u32; 2],
     /// Where the film's pixels are.
     pub grid: FilmGrid,
+    /// What guides all samples, if it was trained before.
+    guide: Option<Guide>,
 }
 
 /// The buffers of one thread.
@@ -106,6 +108,7 @@ impl<'a> TileRenderer<'a> {
             overscan: settings.overscan,
             filter,
             view: settings.size,
+            guide: settings.guide.as_ref().and_then(|guide| guide.of_scene(accel.bounds())),
         }
     }
 
@@ -145,7 +148,7 @@ impl<'a> TileRenderer<'a> {
             self.camera_rays(count, film, numbers, block);
             camera_batch.extend(count);
         }
-        let pass = PassContext { world: &self.world, render: self.context, guide };
+        let pass = PassContext { world: &self.world, render: self.context, guide: guide.or(self.guide.as_ref()) };
         self.integrator.render_batch(&pass, &workspace.samples, &mut workspace.integrator);
     }
 

@@ -155,6 +155,9 @@ pub fn of_render(
         };
         statistics.extend(arguments.json.iter().filter(|path| !is_stdout(path)).map(statistics_of));
     }
+    if let Some(guide) = &arguments.guide {
+        uses.read(guide, "--guide")?;
+    }
     written.extend(statistics.into_iter().map(|path| (path, "--json")));
     written
         .extend(arguments.import.report.iter().filter(|path| !is_stdout(path)).map(|path| (path.clone(), "--report")));

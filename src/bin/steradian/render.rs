@@ -11,7 +11,7 @@ use steradian::live::{Fan, Live};
 use steradian::output::{self, RenderInfo, RenderStatistics};
 use steradian::render::{
     self, DEFAULT_EXTENSIONS, Header, Progress, RenderProvenance, RenderResult, RenderSession, Replayed, Settings,
-    Stats,
+    Stats, TrainedGuide,
 };
 use steradian::scene::Scene;
 use steradian::{Result, compile};
@@ -100,8 +100,15 @@ impl<'a> Plan<'a> {
         let shard_name = kept::take_shard_name(&arguments.state, &arguments.scene, &mut overrides)?;
         let shard_file = shard_name.as_deref().map(|name| shot.file_of(name));
         let mut settings = match &arguments.repeat {
-            Some(repeat) => repeat.provenance.settings(render::threads(arguments.threads)?),
-            None => Settings::new(&shot.imported.desc, &overrides)?,
+            Some(repeat) => {
+                let settings = repeat.provenance.settings(render::threads(arguments.threads)?);
+                let guide = settings.guide.map(|guide| guide.reload(arguments.guide.as_deref())).transpose()?;
+                Settings { guide, ..settings }
+            }
+            None => {
+                overrides.guide = arguments.guide.as_deref().map(TrainedGuide::read).transpose()?;
+                Settings::new(&shot.imported.desc, &overrides)?
+            }
         };
         if arguments.pixel.is_none() {
             files::of_render(arguments, shot, &settings.outputs, shard_name.as_deref(), session.uses.clone())?;

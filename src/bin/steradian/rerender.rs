@@ -44,6 +44,7 @@ pub fn run(arguments: &RerenderArgs, mut uses: FileUses) -> Result<u8> {
     render.scene = scene_file(arguments, &provenance);
     render.output = vec![arguments.output.clone()];
     render.threads = arguments.threads;
+    render.guide.clone_from(&arguments.guide);
     render.verbosity.quiet = arguments.quiet;
     render.denoise.denoise = provenance.denoise;
     render.denoise.oidn.clone_from(&arguments.oidn);

@@ -8,6 +8,7 @@ use super::terminator;
 use super::wave::{BsdfScratch, Wave, path_flags};
 use crate::bsdf::Lambert;
 use crate::geometry::SpawnPoint;
+use crate::guiding::Guide;
 use crate::integrator::vertex::HemisphereTest;
 use crate::math::Frame;
 use crate::math::rows::BATCH;
@@ -47,7 +48,7 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
             },
         );
     }
-    if regions.is_some() {
+    if context.pass.guide.is_some_and(Guide::learns) {
         guided.record(vertices, &paths[block]);
     }
 }

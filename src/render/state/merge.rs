@@ -6,6 +6,7 @@ use super::container::Reader;
 use super::{Header, RenderState, Shard};
 use crate::error::{Error, Result};
 use crate::film::Film;
+use crate::guiding::Guide;
 use crate::integrator::RayCounts;
 use crate::render::TILE_SIZE;
 use crate::render::planner::{GuidedPlanner, Planner};
@@ -46,16 +47,13 @@ pub fn merge(files: &[PathBuf], partial: bool) -> Result<Merged> {
         let message = format!("{message}; --partial merges what is there");
         return Err(Error::Checkpoint { file: file.clone(), message });
     }
-    let film = Film::new(headers[0].film.clone(), TILE_SIZE).map_err(|error| match error {
-        error @ Error::OutOfMemory(_) => error,
-        error => Error::Checkpoint { file: first.clone(), message: error.to_string() },
-    })?;
-    let mut state = RenderState::of_film(film, Planner::Uniform, Shard::WHOLE);
-    if headers[0].is_guided() {
-        add_guided(&mut state, first)?;
+    let mut state = if headers[0].is_guided() {
+        guided_state(first)?.0
     } else {
+        let mut state = RenderState::of_film(film(&headers[0], first)?, Planner::Uniform, Shard::WHOLE);
         files.iter().try_for_each(|file| add(&mut state, file))?;
-    }
+        state
+    };
     state.complete = lack.is_none();
     Ok(Merged { state, header: headers.swap_remove(0), partial: lack.map(|(_, message)| message) })
 }
@@ -99,13 +97,40 @@ fn lack(files: &[PathBuf], headers: &[Header]) -> Option<(PathBuf, String)> {
     Some((file.clone(), parts.join(", ")))
 }
 
-/// Takes over the state of a guided render, which is never split.
-fn add_guided(state: &mut RenderState, file: &Path) -> Result<()> {
-    state.planner = Planner::Guided(Box::new(GuidedPlanner::new(&state.film)?));
-    state.load(&mut Reader::open(file)?)?;
+/// The empty film of the render of a file.
+fn film(header: &Header, file: &Path) -> Result<Film> {
+    Film::new(header.film.clone(), TILE_SIZE).map_err(|error| match error {
+        error @ Error::OutOfMemory(_) => error,
+        error => Error::Checkpoint { file: file.to_owned(), message: error.to_string() },
+    })
+}
+
+/// All samples of a guided render, which is never split, and its guide.
+fn guided_state(file: &Path) -> Result<(RenderState, Option<Guide>)> {
+    let mut reader = Reader::open(file)?;
+    if !reader.header().is_guided() {
+        return Err(reader.fault("it is the state of a render without --guiding on, and holds no guide"));
+    }
+    let film = film(reader.header(), file)?;
+    let planner = Planner::Guided(Box::new(GuidedPlanner::new(&film)?));
+    let mut state = RenderState::of_film(film, planner, Shard::WHOLE);
+    state.load(&mut reader)?;
     state.film = state.whole_film().into_owned();
-    state.planner = Planner::Uniform;
-    Ok(())
+    let Planner::Guided(planner) = std::mem::replace(&mut state.planner, Planner::Uniform) else {
+        return Ok((state, None));
+    };
+    Ok((state, planner.guide))
+}
+
+/// The guide in the checkpoint of a guided render.
+///
+/// # Errors
+/// [`Error::Missing`] if the file cannot be read; [`Error::Checkpoint`] if it is damaged or holds no guide.
+pub(in crate::render) fn read_guide(file: &Path) -> Result<Guide> {
+    guided_state(file)?.1.ok_or_else(|| Error::Checkpoint {
+        file: file.to_owned(),
+        message: "guiding did not pay in this render and ended: there is no guide; render without --guide".to_owned(),
+    })
 }
 
 /// Adds the samples of a file.

@@ -14,6 +14,7 @@ pub use checkpoints::Checkpoints;
 pub use file::StateFile;
 pub(super) use header::put;
 pub use header::{Header, Shard};
+pub(super) use merge::read_guide;
 pub use merge::{Merged, merge};
 
 use std::io::{self, Write};
@@ -207,7 +208,7 @@ pub fn check_kept(settings: &Settings, shard: Shard) -> Result<()> {
     if shard != Shard::WHOLE && settings.is_guided() {
         return Err(Error::Usage(
             "--shard: not with guiding, for paths learn from nearly all samples before, which each part would render; \
-             give --guiding off"
+             give --guiding off, or --guide with the checkpoint of a guided render"
                 .into(),
         ));
     }

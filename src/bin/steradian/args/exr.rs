@@ -109,6 +109,9 @@ pub struct RerenderArgs {
     /// Go on though the scene or its files have changed
     #[arg(long)]
     pub allow_changed: bool,
+    /// The checkpoint with the guide of a picture that was rendered with --guide
+    #[arg(long, value_name = "FILE")]
+    pub guide: Option<PathBuf>,
     /// Other samples per pixel
     #[arg(long, value_name = "N")]
     pub spp: Option<u32>,

@@ -242,9 +242,17 @@ pub struct RenderArgs {
     /// For scenes whose light comes by few ways, such as through a door ajar. Iterations double; each is guided by the
     /// samples of those before, and weighted by its inverse variance. Guiding ends where it does not pay. With
     /// --checkpoint and --resume the picture is the same bit for bit. Unsupported with --shard: each part would have to
-    /// render nearly all samples to train the guide.
+    /// render nearly all samples to train the guide; --guide uses a trained one.
     #[arg(long, value_name = "SWITCH", value_parser = parse_switch, help_heading = "Algorithm")]
     pub guiding: Option<bool>,
+    /// Guide paths by what another render has learned: the --checkpoint of one with --guiding on
+    ///
+    /// The guide is not trained further, whatever --guiding says. Samples then depend on it alone, so that --shard,
+    /// --pixel, --target-error and --resume with more samples work as without guiding. The scene, the camera and the
+    /// settings may be others than those it was trained with: the picture stays right, and is the less noisy the more
+    /// alike the light is.
+    #[arg(long, value_name = "FILE", help_heading = "Algorithm")]
+    pub guide: Option<PathBuf>,
     /// How samples are chosen
     #[arg(long, value_name = "NAME", value_parser = names::plain::<SamplerKindDesc>(), help_heading = "Algorithm")]
     pub sampler: Option<SamplerKindDesc>,
@@ -375,6 +383,7 @@ impl RenderArgs {
             clamp: self.clamp,
             regularize: self.regularize,
             guiding: self.guiding,
+            guide: None,
             time_limit: self.time_limit,
             outputs: self.output.clone(),
             default_outputs,

@@ -41,7 +41,7 @@ pub struct StateArgs {
     ///
     /// -o names the file, which ends with .shard; without it, that is SCENE.I-of-N.shard. All parts are to have the
     /// same options; merged, they are the same picture bit for bit as in one run. Not with --target-error or
-    /// --guiding on.
+    /// --guiding on, but with --guide.
     #[arg(long, value_name = "I/N", help_heading = "State")]
     pub shard: Option<Shard>,
 }
