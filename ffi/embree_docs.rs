@@ -166,10 +166,9 @@ pub const RTC_ERROR_OUT_OF_MEMORY: RTCError = 4;
 pub const RTC_ERROR_UNSUPPORTED_CPU: RTCError = 5;
 pub const RTC_ERROR_CANCELLED: RTCError = 6;
 pub type RTCError = ::std::os::raw::c_uint;
-pub type RTCErrorFunction =
-    ::std::option::Option<unsafe extern "C" fn(
-        userPtr: *mut ::std::os::raw::c_void, code: RTCError, str_: *const ::std::os::raw::c_char
-    )>;
+pub type RTCErrorFunction = ::std::option::Option<
+    unsafe extern "C" fn(userPtr: *mut ::std::os::raw::c_void, code: RTCError, str_: *const ::std::os::raw::c_char),
+>;
 pub type RTCMemoryMonitorFunction =
     ::std::option::Option<unsafe extern "C" fn(ptr: *mut ::std::os::raw::c_void, bytes: isize, post: bool) -> bool>;
 pub const RTC_BUFFER_TYPE_INDEX: RTCBufferType = 0;
@@ -361,13 +360,16 @@ pub struct StHit {
     pub geometry: u32,
     pub instance: u32,
 }
-pub type StIntersect =
-    ::std::option::Option<unsafe extern "C" fn(
-        shape: *const ::std::os::raw::c_void, ray: *const StRay, key: u32, instance: u32
-    ) -> f32>;
+pub type StIntersect = ::std::option::Option<
+    unsafe extern "C" fn(shape: *const ::std::os::raw::c_void, ray: *const StRay, key: u32, instance: u32) -> f32,
+>;
 pub type StIntersectPacket = ::std::option::Option<
     unsafe extern "C" fn(
-        shape: *const ::std::os::raw::c_void, rays: *const f32, n: u32, valid: *const ::std::os::raw::c_int, t: *mut f32
+        shape: *const ::std::os::raw::c_void,
+        rays: *const f32,
+        n: u32,
+        valid: *const ::std::os::raw::c_int,
+        t: *mut f32,
     ),
 >;
 pub type StCounts = ::std::option::Option<
@@ -391,10 +393,9 @@ impl Default for StUserShape {
         }
     }
 }
-pub type StEnter =
-    ::std::option::Option<unsafe extern "C" fn(
-        instance: *const ::std::os::raw::c_void, ray: *const StRay, inside: *mut StRay
-    ) -> bool>;
+pub type StEnter = ::std::option::Option<
+    unsafe extern "C" fn(instance: *const ::std::os::raw::c_void, ray: *const StRay, inside: *mut StRay) -> bool,
+>;
 #[repr(C)]
 #[derive(Debug, Copy, Clone)]
 pub struct StEnteredInstance {
@@ -443,9 +444,8 @@ impl Default for StQuery {
         }
     }
 }
-pub type StUncaught = ::std::option::Option<unsafe extern "C" fn(
-    out_of_memory: bool, what: *const ::std::os::raw::c_char
-)>;
+pub type StUncaught =
+    ::std::option::Option<unsafe extern "C" fn(out_of_memory: bool, what: *const ::std::os::raw::c_char)>;
 unsafe extern "C" {
     pub fn rtcNewDevice(config: *const ::std::os::raw::c_char) -> RTCDevice;
     pub fn rtcReleaseDevice(device: RTCDevice);
