@@ -220,14 +220,19 @@ fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc>
         }
         *regularize = Some(alpha).filter(|&alpha| alpha > 0.0);
     }
+    set_guiding(&mut integrator, overrides)?;
+    Ok(integrator)
+}
+
+fn set_guiding(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Result<()> {
     if let Some(enabled) = overrides.guiding {
-        let IntegratorDesc::Path { guiding, .. } = &mut integrator else {
+        let IntegratorDesc::Path { guiding, .. } = integrator else {
             return Err(usage("--guiding: only the integrator path can be guided"));
         };
         *guiding = enabled;
     }
     if overrides.guide.is_some() {
-        let IntegratorDesc::Path { guiding, .. } = &mut integrator else {
+        let IntegratorDesc::Path { guiding, .. } = integrator else {
             return Err(usage("--guide: only the integrator path can be guided"));
         };
         // The guide is not trained further, whatever the scene says.
@@ -238,7 +243,7 @@ fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc>
             "--target-error: not with guiding; give --guide, --guiding off, or --spp or --time-limit in its place",
         ));
     }
-    Ok(integrator)
+    Ok(())
 }
 
 /// The number of threads that `--threads` means; without it, or with 0, all that the process may use.
