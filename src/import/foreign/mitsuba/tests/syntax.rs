@@ -9,9 +9,12 @@ fn sphere_radius(imported: &Imported) -> f64 {
     }
 }
 
-const WITH_DEFAULT: &str = r#"<scene version="3.0.0"><default name="r" value="2"/><default name="r" value="3"/>
-<default name="kind" value="perspective"/><sensor type="$kind"/><shape type="sphere">
-<float name="radius" value="$r"/></shape></scene>"#;
+const WITH_DEFAULT: &str = concat!(
+    r#"<scene version="3.0.0"><default name="r" value="2"/><default name="r" value="3"/>"#,
+    "\n",
+    r#"<default name="kind" value="perspective"/><sensor type="$kind"/>"#,
+    r#"<shape type="sphere"><float name="radius" value="$r"/></shape></scene>"#
+);
 
 #[test]
 fn the_first_default_counts_unless_the_user_defines_another_value() {
