@@ -77,7 +77,7 @@ const OPTIONS: [(Trust, &[&str]); 3] = [
     ),
     (
         Trust::CommandLine,
-        &["pixel", "sample", "frames", "checkpoint", "resume", "shard", "json", "report", "help", "version"],
+        &["pixel", "sample", "frames", "checkpoint", "resume", "guide", "shard", "json", "report", "help", "version"],
     ),
 ];
 

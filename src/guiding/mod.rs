@@ -6,17 +6,20 @@
 //! whole numbers, so what is learned does not depend on threads. From time to time leaves with many records are
 //! divided, and the directions of each where the light is.
 
+mod directions;
 mod quadtree;
 mod state;
 #[cfg(test)]
 mod tests;
 
-pub use quadtree::{DTree, DTreeBuilder, GuideSample};
+pub use directions::{DirectionDistribution, GuideSample, PdfLookup, SampleLookup};
+pub use quadtree::DirectionRecords;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 
 use crate::math::float::ONE_MINUS_EPSILON;
+use crate::math::prefetch::prefetch;
 use crate::math::random::hash64;
 use crate::math::{Aabb, Vec3};
 
@@ -56,6 +59,52 @@ struct Node(u32);
 
 const IS_LEAF: u32 = 1 << 31;
 
+/// Divisions of each axis that the table of starts has.
+const START_BITS: u32 = 4;
+
+/// Divisions in a row that lookups skip by the table.
+const START_DEPTH: u32 = 3 * START_BITS;
+
+/// Trees over space, one for each side that surfaces face.
+const ROOTS: usize = 6;
+
+/// Where lookups in a part of space start: a leaf above [`START_DEPTH`], or the node there.
+#[derive(Clone, Copy, Debug, Default)]
+struct Start {
+    node: u32,
+    depth: u32,
+}
+
+/// The starts of all parts of space, by the divisions that lead there.
+fn starts(nodes: &[Node]) -> Vec<Start> {
+    let mut starts = Vec::with_capacity(ROOTS << START_DEPTH);
+    let mut open: Vec<Start> = (0..ROOTS as u32).rev().map(|node| Start { node, depth: 0 }).collect();
+    while let Some(start) = open.pop() {
+        let Start { node, depth } = start;
+        if depth == START_DEPTH || nodes[node as usize].leaf().is_some() {
+            starts.extend(std::iter::repeat_n(start, 1 << (START_DEPTH - depth)));
+        } else {
+            let first = nodes[node as usize].0;
+            open.extend([first + 1, first].map(|node| Start { node, depth: depth + 1 }));
+        }
+    }
+    starts
+}
+
+/// The first divisions that lead to a point of the unit cube, and where in the part of space it is.
+#[inline]
+fn divisions(at: Vec3) -> (usize, [f32; 3]) {
+    let scaled = (at * (1 << START_BITS) as f32).to_array();
+    let cell = scaled.map(|x| x as i32);
+    // Every third bit.
+    let spread = |x: i32| {
+        let x = (x | x << 4) & 0x0c3;
+        (x | x << 2) & 0x249
+    };
+    let path = spread(cell[0]) << 2 | spread(cell[1]) << 1 | spread(cell[2]);
+    (path as usize, [0, 1, 2].map(|k| scaled[k] - cell[k] as f32))
+}
+
 impl Node {
     /// The leaf, if it is one.
     #[inline]
@@ -68,14 +117,14 @@ impl Node {
 /// those that read the other.
 #[derive(Clone, Debug)]
 struct Region {
-    directions: Option<Arc<DTree>>,
+    directions: Option<Arc<DirectionDistribution>>,
     bsdf_sampling_fraction: f32,
 }
 
 /// What is being learned of a part of space.
 #[derive(Debug, Default)]
 struct Leaf {
-    records: DTreeBuilder,
+    records: DirectionRecords,
     count: AtomicU64,
     /// How much better each of [`OTHER_FRACTIONS`] is than half, as the mean logarithm of the density weighted by
     /// light.
@@ -94,7 +143,7 @@ impl Leaf {
 #[derive(Clone, Copy, Debug)]
 pub struct GuideRegion<'a> {
     /// Where it comes from.
-    pub directions: &'a DTree,
+    pub directions: &'a DirectionDistribution,
     /// Fraction of directions to be sampled from the BSDF.
     pub bsdf_sampling_fraction: f32,
 }
@@ -114,14 +163,25 @@ pub struct Record {
     pub densities: Option<[f32; 2]>,
 }
 
+/// Where a record belongs.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RecordLeaf {
+    at: Vec3,
+    root: usize,
+    leaf: usize,
+    depth: u32,
+}
+
 /// The learned distribution of incident radiance over a scene, and the records of the next one.
 #[derive(Debug)]
 pub struct Guide {
     /// Of the box around the scene, a cube.
     corner: Vec3,
     inverse_size: f32,
-    /// The first six are roots.
+    /// The first [`ROOTS`] are roots.
     nodes: Vec<Node>,
+    /// Of `nodes`.
+    starts: Vec<Start>,
     learned: Vec<Region>,
     leaves: Vec<Leaf>,
     /// From light to whole numbers.
@@ -136,12 +196,14 @@ impl Guide {
         let mut guide = Self {
             corner: Vec3::ZERO,
             inverse_size: 0.0,
-            nodes: (0..6).map(|leaf| Node(leaf | IS_LEAF)).collect(),
-            learned: vec![Region { directions: None, bsdf_sampling_fraction: BSDF_SAMPLING_FRACTION }; 6],
-            leaves: (0..6).map(|_| Leaf::default()).collect(),
+            nodes: (0..ROOTS as u32).map(|leaf| Node(leaf | IS_LEAF)).collect(),
+            starts: Vec::new(),
+            learned: vec![Region { directions: None, bsdf_sampling_fraction: BSDF_SAMPLING_FRACTION }; ROOTS],
+            leaves: (0..ROOTS).map(|_| Leaf::default()).collect(),
             scale: scale_of(typical),
             learns: true,
         };
+        guide.starts = starts(&guide.nodes);
         guide.set_bounds(bounds);
         guide
     }
@@ -180,26 +242,65 @@ impl Guide {
     }
 
     /// What is known of the light at a surface whose normal, on the side of the path, is `n`; `None` if nothing.
-    #[inline]
     pub fn at(&self, p: Vec3, n: Vec3) -> Option<GuideRegion<'_>> {
-        let learned = &self.learned[self.find(root(n), self.normalized(p)).0];
+        self.region(self.find_region(p, n))
+    }
+
+    /// The number of the [region](Self::region) of a surface; it is being loaded then.
+    #[inline]
+    pub fn find_region(&self, p: Vec3, n: Vec3) -> u32 {
+        let region = self.find(root(n), self.normalized(p)).0;
+        prefetch(&self.learned, region);
+        region as u32
+    }
+
+    /// What is known of the light in a region; `None` if nothing.
+    #[inline]
+    pub fn region(&self, region: u32) -> Option<GuideRegion<'_>> {
+        let learned = &self.learned[region as usize];
         let directions = learned.directions.as_deref()?;
         Some(GuideRegion { directions, bsdf_sampling_fraction: learned.bsdf_sampling_fraction })
     }
 
     /// Learns from light. What is not a finite number above zero counts as no light. Equal records are treated alike.
-    #[inline]
     pub fn record(&self, record: &Record) {
-        let Record { p, n, direction, light, densities } = *record;
-        let (at, root) = (self.normalized(p), root(n));
+        self.record_in(&self.find_leaf(record), record);
+    }
+
+    /// The leaf of a record; it is being loaded then.
+    #[inline]
+    pub fn find_leaf(&self, record: &Record) -> RecordLeaf {
+        let (at, root) = (self.normalized(record.p), root(record.n));
         let (leaf, depth) = self.find(root, at);
+        prefetch(&self.leaves, leaf);
+        RecordLeaf { at, root, leaf, depth }
+    }
+
+    /// Starts to load the records of a leaf.
+    #[inline]
+    pub fn prefetch_records(&self, leaf: &RecordLeaf) {
+        self.leaves[leaf.leaf].records.prefetch();
+    }
+
+    /// [`record`](Self::record) with the leaf that was found before.
+    #[inline]
+    pub fn record_in(&self, leaf: &RecordLeaf, record: &Record) {
+        let Record { direction, light, densities, .. } = *record;
+        let RecordLeaf { at, root, leaf, depth } = *leaf;
         self.leaves[leaf].count.fetch_add(1, Ordering::Relaxed);
         if !(light > 0.0 && light < f32::INFINITY && direction.is_finite()) {
             return;
         }
         let amount = (light * self.scale).min(LARGEST * UNITS);
+        // Random numbers of the record itself.
+        let bits = |a: f32, b: f32| u64::from(a.to_bits()) << 32 | u64::from(b.to_bits());
+        let first = hash64(bits(at.x, direction.x) ^ hash64(bits(at.y, direction.y) ^ hash64(bits(at.z, light))));
+        let second = hash64(first);
+        let unit = |bits: u64| (bits & 0xf_ffff) as f32 * (1.0 / 1_048_576.0);
+        // Four logarithms take as long as all the rest.
+        let is_chosen = second >> 60 < 4;
         if let Some([surface, guide]) =
-            densities.filter(|[surface, guide]| (surface + guide).is_finite() && surface + guide > 0.0)
+            densities.filter(|[surface, guide]| is_chosen && (surface + guide).is_finite() && surface + guide > 0.0)
         {
             let usual = BSDF_SAMPLING_FRACTION * surface + (1.0 - BSDF_SAMPLING_FRACTION) * guide;
             for (sum, share) in self.leaves[leaf].gains.iter().zip(OTHER_FRACTIONS) {
@@ -208,13 +309,9 @@ impl Guide {
             }
         }
 
-        // Random numbers of the record itself.
-        let bits = |a: f32, b: f32| u64::from(a.to_bits()) << 32 | u64::from(b.to_bits());
-        let first = hash64(bits(at.x, direction.x) ^ hash64(bits(at.y, direction.y) ^ hash64(bits(at.z, light))));
-        let second = hash64(first);
-        let unit = |bits: u64| (bits & 0xf_ffff) as f32 * (1.0 / 1_048_576.0);
         // Moved by up to half a leaf: what leaves learn does not jump at their borders then.
-        let jitter = |k: u32| 0.5f32.powi(((depth + 2 - k) / 3) as i32) * (unit(first >> (20 * k)) - 0.5);
+        let size = |divisions: u32| f32::from_bits((127 - divisions) << 23);
+        let jitter = |k: u32| size((depth + 2 - k) / 3) * (unit(first >> (20 * k)) - 0.5);
         let moved = at + Vec3::new(jitter(0), jitter(1), jitter(2));
         let is_inside = moved.min_element() >= 0.0 && moved.max_element() < 1.0;
         let leaf = if is_inside { self.find(root, moved).0 } else { leaf };
@@ -225,7 +322,8 @@ impl Guide {
     #[must_use]
     pub fn refined(&self, samples: u32) -> Self {
         let most_records = (RECORDS_TO_DIVIDE * f64::from(samples).sqrt()) as u64;
-        let mut next = Self { nodes: self.nodes.clone(), learned: Vec::new(), leaves: Vec::new(), ..*self };
+        let (starts, learned, leaves) = (Vec::new(), Vec::new(), Vec::new());
+        let mut next = Self { nodes: self.nodes.clone(), starts, learned, leaves, ..*self };
         let depths = self.depths();
         let mut free = MAX_LEAVES.saturating_sub(self.leaves.len());
         let mut plans = Vec::new();
@@ -255,6 +353,7 @@ impl Guide {
                 });
             }
         }
+        next.starts = self::starts(&next.nodes);
         next
     }
 
@@ -309,8 +408,9 @@ impl Guide {
     /// The leaf around a point of the unit cube, and its depth.
     #[inline]
     fn find(&self, root: usize, at: Vec3) -> (usize, u32) {
-        let mut at = at.to_array();
-        let (mut index, mut depth, mut axis) = (root, 0, 0);
+        let (path, mut at) = divisions(at);
+        let Start { node, mut depth } = self.starts[root << START_DEPTH | path];
+        let (mut index, mut axis) = (node as usize, 0);
         loop {
             let node = self.nodes[index];
             if let Some(leaf) = node.leaf() {

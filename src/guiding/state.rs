@@ -3,7 +3,9 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 
-use super::{DTree, DTreeBuilder, Guide, Leaf, MAX_LEAVES, MAX_NODES_OF_LEAF, Node, Region};
+use super::{
+    DirectionDistribution, DirectionRecords, Guide, Leaf, MAX_LEAVES, MAX_NODES_OF_LEAF, Node, ROOTS, Region, starts,
+};
 use crate::bytes::{ByteReader, ByteWriter};
 use crate::math::Aabb;
 
@@ -25,7 +27,8 @@ impl Clone for Guide {
             gains: leaf.gains.each_ref().map(|gain| AtomicI64::new(gain.load(Ordering::Relaxed))),
         };
         let leaves = self.leaves.iter().map(copy).collect();
-        Self { nodes: self.nodes.clone(), learned: self.learned.clone(), leaves, ..*self }
+        let (nodes, starts, learned) = (self.nodes.clone(), self.starts.clone(), self.learned.clone());
+        Self { nodes, starts, learned, leaves, ..*self }
     }
 }
 
@@ -34,7 +37,7 @@ impl Guide {
     pub fn write(&self, out: &mut ByteWriter) {
         out.integers(&self.nodes.iter().map(|node| node.0).collect::<Vec<_>>());
         out.integers(&[self.scale.to_bits()]);
-        let mut last: Option<&Arc<DTree>> = None;
+        let mut last: Option<&Arc<DirectionDistribution>> = None;
         for (learned, leaf) in self.learned.iter().zip(&self.leaves) {
             let own = learned.directions.as_ref();
             let is_shared = own.zip(last).is_some_and(|(own, last)| Arc::ptr_eq(own, last));
@@ -61,12 +64,13 @@ impl Guide {
         for _ in 0..leaves {
             let learned = read_learned(data, guide.learned.last())?;
             guide.learned.push(learned);
-            let records = DTreeBuilder::read(data, MAX_NODES_OF_LEAF)?;
+            let records = DirectionRecords::read(data, MAX_NODES_OF_LEAF)?;
             let count = AtomicU64::new(data.long()?);
             let gains =
                 [data.long()?, data.long()?, data.long()?, data.long()?].map(|gain| AtomicI64::new(gain as i64));
             guide.leaves.push(Leaf { records, count, gains });
         }
+        guide.starts = starts(&guide.nodes);
         Some(guide)
     }
 }
@@ -76,7 +80,7 @@ fn read_learned(data: &mut ByteReader, last: Option<&Region>) -> Option<Region> 
     let directions = match place {
         directions::NONE => None,
         directions::SHARED => Some(last?.directions.clone()?),
-        directions::OWN => Some(Arc::new(DTree::read(data, MAX_NODES_OF_LEAF)?)),
+        directions::OWN => Some(Arc::new(DirectionDistribution::read(data)?)),
         _ => return None,
     };
     let bsdf_sampling_fraction = Some(f32::from_bits(share)).filter(|share| *share > 0.0 && *share < 1.0)?;
@@ -105,6 +109,3 @@ fn count_leaves(nodes: &[Node]) -> Option<usize> {
     let (roots, others) = is_child.split_at_checked(ROOTS)?;
     (are_roots(roots) && others.iter().all(|is_child| *is_child)).then_some(leaves)
 }
-
-/// Trees over space, one for each side that surfaces face.
-const ROOTS: usize = 6;

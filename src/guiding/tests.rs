@@ -65,7 +65,7 @@ fn samples_follow_the_density_which_integrates_to_one() {
 }
 
 /// Whether the density changes within rounding of a direction.
-fn is_at_border(directions: &DTree, w: Vec3) -> bool {
+fn is_at_border(directions: &DirectionDistribution, w: Vec3) -> bool {
     let pdf = directions.pdf(w);
     let mut rng = Rng::new(1);
     (0..64).any(|_| (directions.pdf((w + 1e-6 * rng.direction().as_vec3()).normalize()) / pdf - 1.0).abs() > 1e-3)
@@ -180,9 +180,9 @@ fn memory_is_bounded() {
 #[test]
 fn shares_follow_what_explains_the_light() {
     for (densities, expected) in [([0.01, 1.0], 0.3), ([1.0, 0.01], 0.9), ([1.0, 1.0], BSDF_SAMPLING_FRACTION)] {
-        let guide = Guide::new(unit_box(), 1.0);
+        let (guide, mut rng) = (Guide::new(unit_box(), 1.0), Rng::new(1));
         for _ in 0..100 {
-            guide.record(&Record { densities: Some(densities), ..record(Vec3::splat(0.5), Vec3::X, 1.0) });
+            guide.record(&Record { densities: Some(densities), ..record(random_place(&mut rng), Vec3::X, 1.0) });
         }
         assert_eq!(guide.refined(1).at(Vec3::splat(0.5), Vec3::Z).unwrap().bsdf_sampling_fraction, expected);
     }

@@ -6,10 +6,10 @@ use super::block::{Vertices, spawn, vertex_flags};
 use super::radiance::Output;
 use super::wave::PathRows;
 use crate::color::Rgb;
-use crate::guiding::{Guide, GuideRegion, Record};
+use crate::guiding::{Guide, GuideRegion, GuideSample, PdfLookup, Record, RecordLeaf};
 use crate::light::light_target;
-use crate::math::Vec3;
 use crate::math::float::ONE_MINUS_EPSILON;
+use crate::math::prefetch::prefetch;
 use crate::math::rows::BATCH;
 
 /// Largest ratio of the density of a direction to that of the BSDF alone which roulette disregards.
@@ -28,13 +28,28 @@ struct GuideVertex {
     slot: u32,
 }
 
+impl GuideVertex {
+    /// The light that the vertex has scattered, over the density of its direction.
+    fn scattered(&self, out: &Output) -> f32 {
+        let incident = out.batch.pixels[self.slot as usize].radiance - self.radiance_before;
+        // What a channel has gained whose throughput is zero is rounding.
+        let of_channel = |incident: f32, weight: f32, all: f32| {
+            if all > 0.0 { (incident * (weight / all)).max(0.0) } else { 0.0 }
+        };
+        let (w, t) = (self.weight, self.throughput);
+        let channels =
+            [of_channel(incident.r, w.r, t.r), of_channel(incident.g, w.g, t.g), of_channel(incident.b, w.b, t.b)];
+        Rgb::from(channels).mean()
+    }
+}
+
 /// The guided vertices of a wave, and how those of one block are sampled.
 pub(super) struct GuideRecorder {
     vertices: Vec<GuideVertex>,
     /// How many of them have their `radiance_before`.
     marked: usize,
     /// By vertex of the block: the direction that the guide has sampled, with its density.
-    sampled: [Option<(Vec3, f32)>; BATCH],
+    sampled: [Option<GuideSample>; BATCH],
     /// By vertex of the block: the densities of the BSDF and of the guide.
     densities: [Option<[f32; 2]>; BATCH],
 }
@@ -54,14 +69,22 @@ fn is_guided(vertices: &Vertices, lane: usize) -> bool {
 /// The guide's region of each vertex of a block, where directions may be guided.
 pub(super) type Regions<'a> = [Option<GuideRegion<'a>>; BATCH];
 
-/// Finds the regions of a block's vertices.
+/// Finds the regions of a block's vertices. Here and below, loops begin lookups in one pass and finish them in the
+/// next: all lanes wait for memory together.
 pub(super) fn find_regions<'a>(guide: &'a Guide, vertices: &Vertices) -> Regions<'a> {
-    let mut regions = [None; BATCH];
-    for (lane, region) in
-        regions.iter_mut().enumerate().take(vertices.count).filter(|&(lane, _)| is_guided(vertices, lane))
-    {
-        *region = guide.at(vertices.points.p.get(lane).as_vec3(), vertices.facing_normal(lane));
+    let mut numbers = [0; BATCH];
+    let lanes = || (0..vertices.count.min(BATCH)).filter(|&lane| is_guided(vertices, lane));
+    for lane in lanes() {
+        numbers[lane] = guide.find_region(vertices.points.p.get(lane).as_vec3(), vertices.facing_normal(lane));
     }
+    let mut regions = [None; BATCH];
+    for lane in lanes() {
+        regions[lane] = guide.region(numbers[lane]);
+        if let Some(region) = &regions[lane] {
+            prefetch(std::slice::from_ref(region.directions), 0);
+        }
+    }
+    regions.iter().flatten().for_each(|region| region.directions.prefetch());
     regions
 }
 
@@ -73,12 +96,15 @@ fn mixed(region: &GuideRegion, [bsdf, guide]: [f32; 2]) -> f32 {
 
 /// Replaces the densities with which scattering finds the lights' directions.
 pub(super) fn mix_scatter_pdfs(regions: &Regions, vertices: &mut Vertices) {
-    let Vertices { light_samples, direct, .. } = vertices;
-    for (lane, region) in regions.iter().enumerate().take(vertices.count) {
-        if let (Some(region), true) = (region, light_samples.target[lane] != light_target::NONE) {
-            direct.scatter_pdf[lane] =
-                mixed(region, [direct.scatter_pdf[lane], region.directions.pdf(light_samples.direction.get(lane))]);
-        }
+    let Vertices { light_samples, direct, count, .. } = vertices;
+    let chosen = || (0..*count).filter_map(|lane| Some((lane, regions[lane].as_ref()?)));
+    let mut lookups = [PdfLookup::default(); BATCH];
+    for (lane, region) in chosen().filter(|&(lane, _)| light_samples.target[lane] != light_target::NONE) {
+        lookups[lane] = region.directions.begin_pdf(light_samples.direction.get(lane));
+    }
+    for (lane, region) in chosen().filter(|&(lane, _)| light_samples.target[lane] != light_target::NONE) {
+        let guide_pdf = region.directions.finish_pdf(&lookups[lane]);
+        direct.scatter_pdf[lane] = mixed(region, [direct.scatter_pdf[lane], guide_pdf]);
     }
 }
 
@@ -91,25 +117,37 @@ impl GuideRecorder {
 
     /// Chooses between the BSDF and the guide at each vertex; the number for the choice becomes one for the lobe.
     pub fn choose(&mut self, regions: &Regions, vertices: &mut Vertices) {
+        let mut lookups = [None; BATCH];
         for (lane, region) in regions.iter().enumerate().take(vertices.count) {
-            self.sampled[lane] = None;
             let Some(region) = region else { continue };
             let (u, share) = (vertices.u_bsdf.of(lane), region.bsdf_sampling_fraction);
             if u[0] < share {
                 vertices.u_bsdf.set_first(lane, (u[0] / share).min(ONE_MINUS_EPSILON));
             } else {
-                let sample = region.directions.sample([u[1], u[2]]);
-                self.sampled[lane] = Some((sample.direction, sample.pdf));
+                lookups[lane] = Some(region.directions.begin_sample([u[1], u[2]]));
             }
+        }
+        for (lane, lookup) in lookups.iter().enumerate().take(vertices.count) {
+            let region = lookup.as_ref().zip(regions[lane].as_ref());
+            self.sampled[lane] = region.map(|(lookup, region)| region.directions.finish_sample(lookup));
         }
     }
 
     /// Replaces the BSDF's samples by those of the guide, and all densities by those of both together.
     pub fn mix(&mut self, context: &Context, regions: &Regions, vertices: &mut Vertices) {
+        let mut lookups = [None; BATCH];
+        for (lane, region) in regions.iter().enumerate().take(vertices.count) {
+            let scatter = &vertices.scatter;
+            let is_of_bsdf = self.sampled[lane].is_none() && scatter.is_valid[lane] != 0 && scatter.is_delta[lane] == 0;
+            if let (Some(region), true) = (region, is_of_bsdf) {
+                let direction = vertices.frame(lane).to_world(scatter.wi.get(lane));
+                lookups[lane] = Some(region.directions.begin_pdf(direction));
+            }
+        }
         for (lane, region) in regions.iter().enumerate().take(vertices.count) {
             self.densities[lane] = None;
             let Some(region) = region else { continue };
-            if let Some((direction, guide_pdf)) = self.sampled[lane] {
+            if let Some(GuideSample { direction, pdf: guide_pdf }) = self.sampled[lane] {
                 let wi = vertices.frame(lane).to_local(direction);
                 let eval = vertices.eval(context.scene, lane, wi);
                 let densities = [eval.pdf, guide_pdf];
@@ -122,22 +160,21 @@ impl GuideRecorder {
                 scatter.is_valid[lane] = u32::from(!eval.value.is_black());
                 (scatter.is_delta[lane], scatter.is_transmission[lane]) = (0, 0);
                 self.densities[lane] = Some(densities);
-            } else if vertices.scatter.is_valid[lane] != 0 {
-                let direction = vertices.frame(lane).to_world(vertices.scatter.wi.get(lane));
-                let scatter = &mut vertices.scatter;
-                let weight = scatter.weight.get(lane);
-                if scatter.is_delta[lane] != 0 {
-                    scatter.weight.set(lane, weight * (1.0 / region.bsdf_sampling_fraction));
-                    scatter.rr_factor[lane] *= region.bsdf_sampling_fraction;
-                } else {
-                    let densities = [scatter.pdf[lane], region.directions.pdf(direction)];
-                    let pdf = mixed(region, densities);
-                    let ratio = pdf / scatter.pdf[lane];
-                    scatter.weight.set(lane, weight * (1.0 / ratio));
-                    scatter.pdf[lane] = pdf;
-                    scatter.rr_factor[lane] *= ratio.min(MAX_PDF_RATIO);
-                    self.densities[lane] = Some(densities);
-                }
+                continue;
+            }
+            let scatter = &mut vertices.scatter;
+            let weight = scatter.weight.get(lane);
+            if let Some(lookup) = &lookups[lane] {
+                let densities = [scatter.pdf[lane], region.directions.finish_pdf(lookup)];
+                let pdf = mixed(region, densities);
+                let ratio = pdf / scatter.pdf[lane];
+                scatter.weight.set(lane, weight * (1.0 / ratio));
+                scatter.pdf[lane] = pdf;
+                scatter.rr_factor[lane] *= ratio.min(MAX_PDF_RATIO);
+                self.densities[lane] = Some(densities);
+            } else if scatter.is_valid[lane] != 0 {
+                scatter.weight.set(lane, weight * (1.0 / region.bsdf_sampling_fraction));
+                scatter.rr_factor[lane] *= region.bsdf_sampling_fraction;
             }
         }
     }
@@ -176,17 +213,14 @@ impl GuideRecorder {
     /// Records what came from all directions.
     pub fn commit(&mut self, guide: Option<&Guide>, out: &Output) {
         let Some(guide) = guide.filter(|guide| guide.learns()) else { return };
-        for vertex in &mut self.vertices {
-            let incident = out.batch.pixels[vertex.slot as usize].radiance - vertex.radiance_before;
-            // What a channel has gained whose throughput is zero is rounding.
-            let of_channel = |incident: f32, weight: f32, all: f32| {
-                if all > 0.0 { (incident * (weight / all)).max(0.0) } else { 0.0 }
-            };
-            let (w, t) = (vertex.weight, vertex.throughput);
-            let channels =
-                [of_channel(incident.r, w.r, t.r), of_channel(incident.g, w.g, t.g), of_channel(incident.b, w.b, t.b)];
-            vertex.record.light = Rgb::from(channels).mean();
-            guide.record(&vertex.record);
+        let mut leaves = [RecordLeaf::default(); BATCH];
+        for vertices in self.vertices.chunks_mut(BATCH) {
+            for (vertex, leaf) in vertices.iter_mut().zip(&mut leaves) {
+                vertex.record.light = vertex.scattered(out);
+                *leaf = guide.find_leaf(&vertex.record);
+            }
+            leaves[..vertices.len()].iter().for_each(|leaf| guide.prefetch_records(leaf));
+            vertices.iter().zip(&leaves).for_each(|(vertex, leaf)| guide.record_in(leaf, &vertex.record));
         }
     }
 }

@@ -15,9 +15,9 @@ use crate::render::TILE_SIZE;
 /// less than without.
 const MIN_GAINS: [(u32, f64); 2] = [(8, 1.2), (16, GUIDED_COST)];
 
-/// Time of a ray of a guided path over that of another, about, learning included: from 2.5 in a room seen through a
-/// door to 3.7 in a Cornell box.
-const GUIDED_COST: f64 = 2.5;
+/// Time of a ray of a guided path over that of another, about, learning included: from 1.2 under many lights to 1.9 in
+/// a Cornell box.
+const GUIDED_COST: f64 = 1.9;
 
 /// The guide, and the samples that have no weight yet.
 #[derive(Clone, Debug)]
