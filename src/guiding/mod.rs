@@ -297,10 +297,8 @@ impl Guide {
         let first = hash64(bits(at.x, direction.x) ^ hash64(bits(at.y, direction.y) ^ hash64(bits(at.z, light))));
         let second = hash64(first);
         let unit = |bits: u64| (bits & 0xf_ffff) as f32 * (1.0 / 1_048_576.0);
-        // Four logarithms take as long as all the rest.
-        let is_chosen = second >> 60 < 4;
         if let Some([surface, guide]) =
-            densities.filter(|[surface, guide]| is_chosen && (surface + guide).is_finite() && surface + guide > 0.0)
+            densities.filter(|[surface, guide]| (surface + guide).is_finite() && surface + guide > 0.0)
         {
             let usual = BSDF_SAMPLING_FRACTION * surface + (1.0 - BSDF_SAMPLING_FRACTION) * guide;
             for (sum, share) in self.leaves[leaf].gains.iter().zip(OTHER_FRACTIONS) {
