@@ -192,8 +192,8 @@ fn octree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
             ),
             format!(
                 "The report's octree is {:.1} times slower than Steradian's: cells of up to 64 triangles by their \
-                 boxes in place of exact overlap ({:.1} against {:.1} triangles tested per ray), a queue without order, \
-                 no end at the first hit.",
+                 boxes in place of exact overlap ({:.1} against {:.1} triangles tested per ray), a queue without \
+                 order, no end at the first hit.",
                 naive.normals.accel_seconds / ours.normals.accel_seconds,
                 naive.tests_per_ray.unwrap_or(f64::NAN),
                 ours.tests_per_ray.unwrap_or(f64::NAN),
