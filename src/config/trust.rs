@@ -30,6 +30,7 @@ const OPTIONS: [(Trust, &[&str]); 3] = [
             "strategy",
             "clamp",
             "regularize",
+            "caustics",
             "guiding",
             "sampler",
             "seed",

@@ -235,6 +235,9 @@ pub enum IntegratorDesc {
         /// such as through a door ajar, for some time of learning. Default: false.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         guiding: bool,
+        /// How the light is found that mirrors and clear glass throw on other surfaces.
+        #[serde(default, skip_serializing_if = "CausticsDesc::is_default")]
+        caustics: CausticsDesc,
     },
     /// Whitted's ray tracing: mirror reflection, refraction, direct illumination by every light, and an ambient term.
     Whitted {
@@ -293,6 +296,7 @@ impl IntegratorDesc {
             regularize: None,
             hide_emitters: false,
             guiding: false,
+            caustics: CausticsDesc::default(),
         }
     }
 }
@@ -336,4 +340,22 @@ pub enum StrategyDesc {
     /// By chance, when a scattered ray meets a light. (Point, spot and sharp directional lights are still sampled:
     /// nothing else finds them.)
     Bsdf,
+}
+
+/// How the light is found that mirrors and clear glass throw on other surfaces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CausticsDesc {
+    /// By chance, when a scattered ray meets a light by way of mirrors and glass: no bias, much noise.
+    #[default]
+    Paths,
+    /// Also by photons from the lights: little noise. They blur the light by about two pixels; the blur vanishes as
+    /// samples are added.
+    Photons,
+}
+
+impl CausticsDesc {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
 }

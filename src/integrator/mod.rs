@@ -5,6 +5,7 @@
 //! together, and each stage's code and data stay in the caches. `docs/wavefront.md` has the figures behind this choice.
 
 mod cancel;
+mod caustics;
 mod cones;
 mod debug;
 mod light_events;
@@ -20,6 +21,7 @@ mod whitted;
 mod world;
 
 pub use cancel::Cancel;
+pub use caustics::{CausticCasters, CausticPoint, Caustics, EPOCH, Photon, PhotonMap};
 pub use debug::{AmbientOcclusion, DebugView, View};
 use path::PathBuffers;
 pub use path::PathIntegrator;
@@ -30,6 +32,8 @@ pub use strategy::Strategy;
 pub use surface::SurfaceAovs;
 pub use whitted::Whitted;
 pub use world::World;
+
+use std::ops::Range;
 
 use crate::desc::IntegratorDesc;
 use crate::film::{LightAovRequest, SampleBatch};
@@ -177,6 +181,17 @@ pub struct PassContext<'a> {
     pub render: RenderContext<'a>,
     /// The learned incident radiance, if paths are guided.
     pub guide: Option<&'a Guide>,
+    /// The photons that paths gather, if they do.
+    pub caustics: Option<&'a Caustics<'a>>,
+}
+
+/// The photons that a part of a pass traces.
+#[derive(Clone, Debug)]
+pub struct PhotonRange {
+    /// Seed of the epoch.
+    pub seed: PixelSeed,
+    /// Indices within the epoch; at most as many as a tile has pixels.
+    pub indices: Range<u32>,
 }
 
 /// The buffers of one thread, reused from batch to batch.
@@ -193,6 +208,18 @@ pub struct Workspace {
 pub trait Integrator: Send + Sync {
     /// Sets the workspace's `out` to one entry for each of `samples`, and adds to its `counts`.
     fn render_batch(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace);
+
+    /// Traces photons from the casters, and appends those that arrive at surfaces which are no mirrors and no glass.
+    /// Integrators without photons trace none.
+    fn trace_photons(
+        &self,
+        _pass: &PassContext,
+        _casters: &CausticCasters,
+        _range: &PhotonRange,
+        _workspace: &mut Workspace,
+        _photons: &mut Vec<Photon>,
+    ) {
+    }
 }
 
 /// What integrators need beside their parameters.

@@ -222,7 +222,7 @@ fn parametrization(scene: &Scene) -> Vec<Parametrization> {
 }
 
 /// Whether a material or one of those that it consists of has a property.
-fn has_part(scene: &Scene, id: MaterialId, has: fn(&Material) -> bool) -> bool {
+pub(super) fn has_part(scene: &Scene, id: MaterialId, has: fn(&Material) -> bool) -> bool {
     let material = &scene.materials[id.index()];
     has(material) || material.parts().is_some_and(|parts| parts.into_iter().any(|part| has_part(scene, part, has)))
 }

@@ -15,6 +15,7 @@ mod spot;
 mod test_support;
 mod tree;
 
+pub(crate) use area::placed_area;
 pub use area::{AreaLight, Emission};
 pub use directional::DirectionalLight;
 pub use environment::{Environment, EnvironmentMap, EnvironmentMapError, EnvironmentScratch};

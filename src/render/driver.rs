@@ -114,7 +114,8 @@ impl Driver<'_> {
                 break;
             }
             let start = Instant::now();
-            let rays = self.render_pass(state, &pass);
+            let mut rays = self.pool.install(|| self.renderer.trace_photons(pass.samples.start));
+            rays.add(&self.render_pass(state, &pass));
             state.rays.add(&rays);
             if self.cancel.is_cancelled() {
                 self.ends(&mut stats, true);

@@ -3,6 +3,7 @@
 //! A batch is one sample index of one tile of the full film's grid, whatever the crop, the threads or the passes; so
 //! every sample can be replayed alone, and any split of the work gives the same picture bit for bit.
 
+mod caustic_pass;
 mod driver;
 mod exr_overrides;
 mod overrides;
@@ -161,7 +162,8 @@ pub fn replay(
                 .into(),
         ));
     }
-    let renderer = TileRenderer::new(scene, accel, settings);
+    let mut renderer = TileRenderer::new(scene, accel, settings);
+    renderer.trace_photons(sample);
     let pixel = pixel.map(|x| x + renderer.grid.offset);
     let origin = pixel.map(|x| x / TILE_SIZE * TILE_SIZE);
     let mut workspace = TileWorkspace::default();

@@ -7,7 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{Overrides, TrainedGuide};
 use crate::accel::AccelKind;
-use crate::desc::{FilterDesc, IntegratorDesc, MAX_SIDE, OutputDesc, PixelTypeDesc, SceneDesc, ViewDesc};
+use crate::desc::{
+    CausticsDesc, FilterDesc, IntegratorDesc, MAX_SIDE, OutputDesc, PixelTypeDesc, SceneDesc, StrategyDesc, ViewDesc,
+};
 use crate::error::{Error, Result};
 use crate::film::{Crop, LayerSet};
 use crate::output::check_output;
@@ -108,6 +110,11 @@ impl Settings {
             outputs,
             layers,
         })
+    }
+
+    /// Whether paths gather photons.
+    pub fn gathers_photons(&self) -> bool {
+        matches!(self.integrator, IntegratorDesc::Path { caustics: CausticsDesc::Photons, .. })
     }
 
     /// Whether paths train a guide: a sample then depends on all that were before.
@@ -221,6 +228,7 @@ fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc>
         *regularize = Some(alpha).filter(|&alpha| alpha > 0.0);
     }
     set_guiding(&mut integrator, overrides)?;
+    set_caustics(&mut integrator, overrides)?;
     Ok(integrator)
 }
 
@@ -244,6 +252,31 @@ fn set_guiding(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Result
         ));
     }
     Ok(())
+}
+
+fn set_caustics(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Result<()> {
+    if let Some(chosen) = overrides.caustics {
+        let IntegratorDesc::Path { caustics, .. } = integrator else {
+            return Err(usage("--caustics: only the integrator path traces photons"));
+        };
+        *caustics = chosen;
+    }
+    let IntegratorDesc::Path { caustics: CausticsDesc::Photons, strategy, regularize, guiding, .. } = integrator else {
+        return Ok(());
+    };
+    let other = [
+        (*strategy != StrategyDesc::Mis, "--strategy other than mis"),
+        (regularize.is_some(), "--regularize"),
+        (*guiding, "--guiding on"),
+        (overrides.guide.is_some(), "--guide"),
+        (overrides.target_error.is_some(), "--target-error"),
+    ];
+    match other.into_iter().find(|(is_given, _)| *is_given) {
+        Some((_, option)) => {
+            Err(usage(format!("--caustics photons: unsupported with {option}; give --caustics paths")))
+        }
+        None => Ok(()),
+    }
 }
 
 /// The number of threads that `--threads` means; without it, or with 0, all that the process may use.

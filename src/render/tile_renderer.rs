@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::caustic_pass::CausticPass;
 use super::pixel_order::{pixel_of_slot, slots};
 use super::{FINEST_SPP, Settings, TILE_SIZE, film_shape};
 use crate::accel::Accelerator;
@@ -11,8 +12,8 @@ use crate::film::{
 };
 use crate::guiding::Guide;
 use crate::integrator::{
-    self, CameraBatch, CameraBlock, Integrator, PassContext, RenderContext, Setup, SurfaceAovs, Workspace, World,
-    dimensions,
+    self, CameraBatch, CameraBlock, Integrator, PassContext, RayCounts, RenderContext, Setup, SurfaceAovs, Workspace,
+    World, dimensions,
 };
 use crate::math::Vec2;
 use crate::math::rows::{BATCH, Row, pair};
@@ -34,6 +35,8 @@ pub(super) struct TileRenderer<'a> {
     pub grid: FilmGrid,
     /// What guides all samples, if it was trained before.
     guide: Option<Guide>,
+    /// What traces and keeps photons, if paths gather them.
+    caustics: Option<CausticPass>,
 }
 
 /// The buffers of one thread.
@@ -108,8 +111,21 @@ impl<'a> TileRenderer<'a> {
             overscan: settings.overscan,
             filter,
             view: settings.size,
+            caustics: settings.gathers_photons().then(|| CausticPass::new(scene, accel, settings)).flatten(),
             guide: settings.guide.as_ref().and_then(|guide| guide.of_scene(accel.bounds())),
         }
+    }
+
+    fn pass<'b>(&'b self, guide: Option<&'b Guide>) -> PassContext<'b> {
+        PassContext { world: &self.world, render: self.context, guide, caustics: None }
+    }
+
+    /// Traces the photons of a sample's epoch, unless they are there; the result is the rays traced.
+    pub fn trace_photons(&mut self, sample: u32) -> RayCounts {
+        let Some(mut caustics) = self.caustics.take() else { return RayCounts::default() };
+        let counts = caustics.trace(sample, self.integrator.as_ref(), &self.pass(None), &self.sampler);
+        self.caustics = Some(caustics);
+        counts
     }
 
     /// Renders one sample of every pixel of the tile with this origin, in the order of [`slots`].
@@ -148,7 +164,8 @@ impl<'a> TileRenderer<'a> {
             self.camera_rays(count, film, numbers, block);
             camera_batch.extend(count);
         }
-        let pass = PassContext { world: &self.world, render: self.context, guide: guide.or(self.guide.as_ref()) };
+        let caustics = self.caustics.as_ref().and_then(CausticPass::caustics);
+        let pass = PassContext { caustics: caustics.as_ref(), ..self.pass(guide.or(self.guide.as_ref())) };
         self.integrator.render_batch(&pass, &workspace.samples, &mut workspace.integrator);
     }
 

@@ -1,6 +1,7 @@
 //! Light that surfaces emit, met by paths.
 
 use super::Context;
+use super::caustics::CausticState;
 use super::radiance::Output;
 use super::wave::{PathRows, Wave};
 use crate::color::Rgb;
@@ -8,17 +9,28 @@ use crate::geometry::SurfaceInteraction;
 use crate::id::LightId;
 use crate::integrator::Strategy;
 use crate::integrator::light_events::LightEvent;
-use crate::light::Light;
-use crate::math::Ray;
+use crate::light::{Light, LightSampleContext};
 use crate::math::rows::BATCH;
+use crate::math::{Ray, Vec3};
 use crate::sampling::power_heuristic;
 
-/// Weight of light that scattering has found, against finding it by sampling the light with density `light_pdf`.
+/// Weight of light that scattering has found, against finding it by sampling the light with density `light_pdf` from
+/// the last vertex; after a delta lobe, against photons, with the path's [`CausticState`].
 #[inline(always)]
-pub(super) fn bsdf_mis_weight(context: &Context, paths: &PathRows, i: usize, light_pdf: impl FnOnce() -> f32) -> f32 {
+pub(super) fn bsdf_mis_weight(
+    context: &Context,
+    paths: &PathRows,
+    i: usize,
+    caustic: Option<&CausticState>,
+    light_pdf: impl FnOnce(&LightSampleContext) -> f32,
+) -> f32 {
+    let from = paths.from(i);
     if paths.is_specular(i) {
-        return 1.0;
+        // Photons come from both sides.
+        let from = LightSampleContext { n: Vec3::ZERO, ..from };
+        return caustic.map_or(1.0, |caustic| caustic.weight(|| light_pdf(&from)));
     }
+    let light_pdf = || light_pdf(&from);
     match context.config.strategy {
         Strategy::Mis => power_heuristic(paths.pdf[i], light_pdf()),
         Strategy::Light => 0.0,
@@ -28,13 +40,14 @@ pub(super) fn bsdf_mis_weight(context: &Context, paths: &PathRows, i: usize, lig
 
 /// Adds the light of emitters at a block's vertices.
 pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Output) {
-    let Wave { vertices, paths, rays, light_aovs, .. } = &*wave;
+    let Wave { vertices, paths, rays, light_aovs, caustics, .. } = &*wave;
     let (paths, rays) = (&paths[block], &rays[block]);
     for &lane in &vertices.emitters {
         let lane = usize::from(lane);
         let i = vertices.path(lane);
         let at = vertices.interaction(lane);
-        let Some((id, radiance)) = emitted(context, paths, i, &rays.get(i), &at) else { continue };
+        let met = Met { paths, i, ray: rays.get(i), caustic: caustics.get(block * BATCH + i) };
+        let Some((id, radiance)) = met.emitted(context, &at) else { continue };
         let light = context.config.clamped(paths.throughput.get(i) * radiance, context.bounce);
         if light.is_black() {
             continue;
@@ -47,22 +60,28 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
     }
 }
 
-/// The light of a surface with what it emits against `ray`, weighted by MIS; `None` if it is no emitter.
-fn emitted(
-    context: &Context,
-    paths: &PathRows,
+/// A path that has met a surface.
+struct Met<'a> {
+    paths: &'a PathRows,
     i: usize,
-    ray: &Ray,
-    at: &SurfaceInteraction,
-) -> Option<(LightId, Rgb)> {
-    let scene = context.scene;
-    let id = scene.surface(at.shape).light(at.prim)?;
-    let Light::Area(light) = scene.lights.get(id) else { return None };
-    let radiance = light.radiance(&scene.geometry, &scene.textures, at, -ray.direction);
-    if radiance.is_black() {
-        return Some((id, radiance));
+    ray: Ray,
+    caustic: Option<&'a CausticState>,
+}
+
+impl Met<'_> {
+    /// The light of the surface with what it emits against the ray, weighted by MIS; `None` if it is no emitter.
+    fn emitted(&self, context: &Context, at: &SurfaceInteraction) -> Option<(LightId, Rgb)> {
+        let Self { paths, i, ray, caustic } = self;
+        let scene = context.scene;
+        let id = scene.surface(at.shape).light(at.prim)?;
+        let Light::Area(light) = scene.lights.get(id) else { return None };
+        let radiance = light.radiance(&scene.geometry, &scene.textures, at, -ray.direction);
+        if radiance.is_black() {
+            return Some((id, radiance));
+        }
+        let light_pdf = |from: &LightSampleContext| {
+            light.pdf(&scene.geometry, from.p, ray, at) * scene.lights.pmf(id, from, context.compensation)
+        };
+        Some((id, radiance * bsdf_mis_weight(context, paths, *i, *caustic, light_pdf)))
     }
-    let from = paths.from(i);
-    let light_pdf = || light.pdf(&scene.geometry, from.p, ray, at) * scene.lights.pmf(id, &from, context.compensation);
-    Some((id, radiance * bsdf_mis_weight(context, paths, i, light_pdf)))
 }

@@ -1,6 +1,7 @@
 //! Light from environments and distant lights, met by rays that leave the scene.
 
 use super::Context;
+use super::caustics::CausticState;
 use super::radiance::Output;
 use super::surface_aovs::write_miss;
 use super::wave::{PathRows, Wave};
@@ -21,7 +22,7 @@ pub(super) struct MissScratch {
 
 /// Adds the light that a block's paths meet which leave the scene.
 pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Output) {
-    let Wave { vertices, paths, rays, light_aovs, miss, .. } = wave;
+    let Wave { vertices, paths, rays, light_aovs, miss, caustics, .. } = wave;
     let (paths, rays, misses) = (&paths[block], &rays[block], &vertices.misses);
     if misses.is_empty() {
         return;
@@ -41,7 +42,7 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
         let i = usize::from(path);
         let direction = directions.get(k);
         let known = image.map(|(id, _)| (id, InfiniteLightEval { radiance: evals.radiance.get(k), pdf: evals.pdf[k] }));
-        let miss = Miss { paths, i, direction, known };
+        let miss = Miss { paths, i, direction, known, caustic: caustics.get(block * BATCH + i) };
         let slot = paths.slot[i];
         if is_visible {
             if context.bounce == 0 {
@@ -70,6 +71,7 @@ struct Miss<'a> {
     direction: Vec3,
     /// An environment and what it emits there, if that has been looked up already.
     known: Option<(LightId, InfiniteLightEval)>,
+    caustic: Option<&'a CausticState>,
 }
 
 impl Miss<'_> {
@@ -81,7 +83,7 @@ impl Miss<'_> {
 
     #[inline(always)]
     fn radiance_of(&self, context: &Context, id: LightId) -> Rgb {
-        let Self { paths, i, direction, known } = *self;
+        let Self { paths, i, direction, known, caustic } = *self;
         let lights = &context.scene.lights;
         let InfiniteLightEval { radiance, pdf } = match known {
             Some((known, eval)) if known == id => eval,
@@ -91,8 +93,8 @@ impl Miss<'_> {
             return Rgb::BLACK;
         }
         radiance
-            * super::emission::bsdf_mis_weight(context, paths, i, || {
-                pdf * lights.pmf(id, &paths.from(i), context.compensation)
+            * super::emission::bsdf_mis_weight(context, paths, i, caustic, |from| {
+                pdf * lights.pmf(id, from, context.compensation)
             })
     }
 

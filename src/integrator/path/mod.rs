@@ -7,6 +7,7 @@
 //! has the idea, `docs/wavefront.md` the figures.
 
 mod block;
+mod caustics;
 mod direct;
 mod emission;
 mod guided;
@@ -14,6 +15,7 @@ mod light_aovs;
 mod materials;
 mod media;
 mod miss;
+mod photons;
 mod radiance;
 mod scatter;
 mod surface_aovs;
@@ -24,7 +26,10 @@ mod wave;
 
 use super::cancel;
 use super::regularization::Regularization;
-use super::{CameraBatch, Integrator, PassContext, Strategy, SurfaceAovs, Workspace, World, dimensions};
+use super::{
+    CameraBatch, CausticCasters, Integrator, PassContext, Photon, PhotonRange, Strategy, SurfaceAovs, Workspace, World,
+    dimensions,
+};
 use crate::color::Rgb;
 use crate::film::LightAovRequest;
 use crate::light::MisCompensation;
@@ -92,6 +97,17 @@ impl Integrator for PathIntegrator {
         workspace.out.reset(samples.len(), self.needs != SurfaceAovs::default(), self.light_aovs);
         self.render_wave(pass, samples, workspace);
     }
+
+    fn trace_photons(
+        &self,
+        pass: &PassContext,
+        casters: &CausticCasters,
+        range: &PhotonRange,
+        workspace: &mut Workspace,
+        photons: &mut Vec<Photon>,
+    ) {
+        photons::trace(self, pass, &photons::Source { casters, range }, workspace, photons);
+    }
 }
 
 impl PathIntegrator {
@@ -113,7 +129,7 @@ impl PathIntegrator {
 
     /// The main loop.
     fn render_wave(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace) {
-        let PassContext { world, render, guide } = *pass;
+        let PassContext { world, render, guide, .. } = *pass;
         let Workspace { out, counts, paths: PathBuffers(wave) } = workspace;
         let (compensation, out) = (self.strategy.compensation(), &mut Output { batch: out });
         let mut context =
@@ -145,6 +161,7 @@ impl PathIntegrator {
                 wave.draw(context);
                 let regions = guide.map(|guide| guided::find_regions(guide, &wave.vertices));
                 direct::sample(context, regions.as_ref(), wave, block);
+                caustics::gather(context, wave, block, out);
                 scatter::sample(context, regions.as_ref(), wave, block);
                 wave.append(context, block, &mut survivors);
             }

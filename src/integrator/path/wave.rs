@@ -1,9 +1,11 @@
 //! The state of a wave: paths under way and the vertices of one block of them, in structures of arrays.
 
 use super::block::{Vertices, spawn};
+use super::caustics::CausticState;
 use super::guided::GuideRecorder;
 use super::light_aovs::LightAovs;
 use super::miss::MissScratch;
+use super::photons::PhotonState;
 use super::terminator::TerminatorRays;
 use super::{Context, dimensions};
 use crate::accel::HitRows;
@@ -130,6 +132,10 @@ pub(super) struct Wave {
     pub media: Vec<MediaState>,
     /// By path, where textures are filtered.
     pub cones: Vec<RayCone>,
+    /// By path, where photons are gathered.
+    pub caustics: Vec<CausticState>,
+    /// By photon, where the wave is one of photons.
+    pub photons: Vec<PhotonState>,
     pub light_aovs: LightAovs,
     pub guided: GuideRecorder,
     pub vertices: Vertices,
@@ -163,6 +169,11 @@ impl Wave {
         }
         self.cones.clear();
         self.cones.extend(samples.iter().map_while(|sample| context.pass.render.camera_cone(&sample.ray)));
+        self.caustics.clear();
+        if context.pass.caustics.is_some() {
+            self.caustics.resize(samples.len(), CausticState::default());
+        }
+        self.photons.clear();
         self.light_aovs.start(context.config, samples.len());
         self.guided.clear();
         self.shadows.count = 0;
@@ -205,7 +216,7 @@ impl Wave {
         if lanes.is_empty() {
             return;
         }
-        if !(self.media.is_empty() && self.cones.is_empty() && !context.needs_aov_state()) {
+        if self.has_optional_columns() || context.needs_aov_state() {
             self.append_optional(context, block, *survivors);
         }
         let Vertices { rows, points, scatter, .. } = &self.vertices;
@@ -266,9 +277,13 @@ impl Wave {
         shadows.count += lanes.len();
     }
 
+    fn has_optional_columns(&self) -> bool {
+        !(self.media.is_empty() && self.cones.is_empty() && self.caustics.is_empty() && self.photons.is_empty())
+    }
+
     /// Moves the state that only some renders have.
     fn append_optional(&mut self, context: &Context, block: usize, survivors: usize) {
-        let Self { vertices, media, cones, light_aovs, .. } = self;
+        let Self { vertices, media, cones, caustics, photons, light_aovs, .. } = self;
         let scatter = &vertices.scatter;
         let lanes = (0..vertices.count).filter(|&lane| scatter.status[lane] == spawn::SPAWNED);
         for (to, lane) in (survivors..).zip(lanes) {
@@ -280,6 +295,12 @@ impl Wave {
                 let is_specular = scatter.path_flags[lane] & path_flags::SPECULAR != 0;
                 let pdf = if is_specular { f32::INFINITY } else { scatter.pdf[lane] };
                 cones[to] = context.pass.render.scattered_cone(cone, vertices.rows.t[lane], pdf);
+            }
+            if let Some(&state) = caustics.get(path) {
+                caustics[to] = super::caustics::after(context, vertices, lane, state);
+            }
+            if let Some(&state) = photons.get(path) {
+                photons[to] = super::photons::after(vertices, lane, state);
             }
             if context.needs_aov_state() {
                 let lobes = || vertices.sampled_lobes(context.scene, lane);

@@ -387,7 +387,7 @@ fn flat_normal(shape: &Shape) -> Option<Vec3> {
 
 /// World area of any analytic shape: where the transform keeps angles that of the shape, else the mean of its inverse
 /// density.
-fn placed_area(placed: &TransformedShape) -> f64 {
+pub(crate) fn placed_area(placed: &TransformedShape) -> f64 {
     if let Some(scale) = placed.transform.uniform_scale() {
         return placed.shape.area() * scale * scale;
     }

@@ -18,7 +18,7 @@ use super::{RenderSession, RenderState, Settings};
 use crate::error::Result;
 use crate::film::{DroppedSample, Film, FilmTile};
 use crate::guiding::Guide;
-use crate::integrator::RayCounts;
+use crate::integrator::{EPOCH, RayCounts};
 
 /// A pass over tiles of the film.
 #[derive(Clone, Debug)]
@@ -114,6 +114,8 @@ impl RenderState {
                 return is_missing.then_some(Pass { samples: 0..size.samples, tiles: 0..all });
             }
             Planner::Guided(planner) => planner.samples_with_this_guide(self.done, spp),
+            // Of one epoch of photons.
+            Planner::Uniform if session.settings.gathers_photons() => EPOCH - missing.start % EPOCH,
             Planner::Uniform => u32::MAX,
         };
         let tiles = self.tiles_ahead..(self.tiles_ahead + size.tiles).min(all);

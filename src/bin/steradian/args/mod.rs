@@ -21,7 +21,7 @@ use std::path::PathBuf;
 use clap::{ArgAction, Args, Parser, Subcommand};
 use clap_complete::Shell;
 use steradian::accel::AccelKind;
-use steradian::desc::{IntegratorDesc, SamplerKindDesc, StrategyDesc, ViewDesc};
+use steradian::desc::{CausticsDesc, IntegratorDesc, SamplerKindDesc, StrategyDesc, ViewDesc};
 use steradian::render::Overrides;
 
 use crate::names::{self, Layers};
@@ -237,6 +237,9 @@ pub struct RenderArgs {
     /// less noise of caustics, but biased. Off by default; 0 for off
     #[arg(long, value_name = "ALPHA", help_heading = "Algorithm")]
     pub regularize: Option<f32>,
+    /// How the light is found that mirrors and clear glass throw on other surfaces
+    #[arg(long, value_name = "NAME", value_parser = names::plain::<CausticsDesc>(), help_heading = "Algorithm")]
+    pub caustics: Option<CausticsDesc>,
     /// Path guiding: sample directions by the incident radiance learned from earlier paths: on or off
     ///
     /// For scenes whose light comes by few ways, such as through a door ajar. Iterations double; each is guided by the
@@ -382,6 +385,7 @@ impl RenderArgs {
             strategy: self.strategy,
             clamp: self.clamp,
             regularize: self.regularize,
+            caustics: self.caustics,
             guiding: self.guiding,
             guide: None,
             time_limit: self.time_limit,

@@ -1,0 +1,95 @@
+//! The mirrors and clear glass of a scene, where caustics start.
+
+use crate::bsdf::BsdfFlags;
+use crate::geometry::{Geometry, Hit, Shape};
+use crate::id::{InstanceId, PrimId, ShapeId};
+use crate::integrator::world::has_part;
+use crate::light::placed_area;
+use crate::math::{DVec3, Vec3};
+use crate::sampling::{AliasTable, warp};
+use crate::scene::Scene;
+
+/// Surfaces with delta lobes, chosen by area. Those that instances place are left out, as are emitters: paths find what
+/// they throw by chance.
+#[derive(Debug)]
+pub struct CausticCasters {
+    prims: Vec<(ShapeId, PrimId)>,
+    /// Chooses one of them.
+    table: AliasTable,
+    /// By shape, one over the area of all casters; 0 for shapes that are none.
+    pdf_area: Vec<f32>,
+}
+
+/// A point of such a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct CausticPoint {
+    /// The shape.
+    pub shape: ShapeId,
+    /// Its primitive.
+    pub prim: PrimId,
+    /// The point.
+    pub p: DVec3,
+    /// Unit geometric normal.
+    pub n: Vec3,
+    /// Density per area.
+    pub pdf_area: f64,
+}
+
+impl CausticCasters {
+    /// Those of a scene; `None` if it has none, or if something moves while the shutter is open.
+    pub fn new(scene: &Scene) -> Option<Self> {
+        if scene.features.motion || scene.lights.is_empty() {
+            return None;
+        }
+        let (mut prims, mut areas, mut is_caster) = (Vec::new(), Vec::new(), vec![false; scene.surfaces.len()]);
+        for &shape in &scene.geometry.world {
+            let surface = scene.surface(shape);
+            let is_specular = has_part(scene, surface.material, |part| part.flags().contains(BsdfFlags::SPECULAR));
+            if !is_specular || surface.first_light.is_some() {
+                continue;
+            }
+            is_caster[shape.index()] = true;
+            for i in 0..scene.geometry.shape(shape).prim_count() {
+                prims.push((shape, PrimId::new(i)));
+                areas.push(area(&scene.geometry, shape, PrimId::new(i)));
+            }
+        }
+        let density = 1.0 / areas.iter().sum::<f64>();
+        let pdf_area = is_caster.into_iter().map(|is_caster| if is_caster { density as f32 } else { 0.0 }).collect();
+        Some(Self { prims, table: AliasTable::new(&areas)?, pdf_area })
+    }
+
+    /// The density per area with which points of a shape are chosen, up to differences within an analytic shape whose
+    /// transform does not keep angles.
+    #[inline]
+    pub fn pdf_area(&self, shape: ShapeId, instance: InstanceId) -> f32 {
+        if instance == Hit::NO_INSTANCE { self.pdf_area[shape.index()] } else { 0.0 }
+    }
+
+    /// A point of a caster.
+    pub fn sample(&self, geometry: &Geometry, [u, v, w]: [f32; 3]) -> CausticPoint {
+        let index = self.table.sample(u).index;
+        let ((shape, prim), pmf) = (self.prims[index], f64::from(self.table.pmf(index)));
+        match geometry.shape(shape) {
+            Shape::Mesh(mesh) => {
+                let points = mesh.triangle_points(prim);
+                let [b, c] = warp::uniform_triangle([v, w]);
+                let [a, edge_u, edge_v] = [points.a, points.b - points.a, points.c - points.a].map(Vec3::as_dvec3);
+                let (p, n) = (a + edge_u * b + edge_v * c, points.cross().normalize().as_vec3());
+                CausticPoint { shape, prim, p, n, pdf_area: pmf / points.area() }
+            }
+            Shape::Analytic(placed) => {
+                let point = placed.sample_area([v, w]);
+                CausticPoint { shape, prim, p: point.p, n: point.n, pdf_area: pmf * point.pdf_area }
+            }
+        }
+    }
+}
+
+/// The area of a primitive in the world.
+fn area(geometry: &Geometry, shape: ShapeId, prim: PrimId) -> f64 {
+    match geometry.shape(shape) {
+        Shape::Mesh(mesh) => mesh.triangle_points(prim).area(),
+        Shape::Analytic(placed) => placed_area(placed),
+    }
+}

@@ -1,0 +1,28 @@
+//! Caustic photons: light that mirrors and clear glass throw on other surfaces, traced from the lights.
+//!
+//! Paths from the camera find such light only if they meet a light by chance. Photons start where the light arrives at
+//! a mirror or a glass surface, follow it through delta lobes, and are stored where it arrives at anything else. There
+//! paths gather those that are near ("vertex merging" of Georgiev et al. 2012, for the paths that have no other
+//! strategy than chance), and multiple importance sampling weighs both ways to find the same light.
+//!
+//! The sample index of a path decides on the photons that it gathers: each epoch of [`EPOCH`] samples has its own,
+//! which depend on the seed and on the epoch alone. The radius shrinks from epoch to epoch, so that the blur vanishes as
+//! samples are added (Knaus and Zwicker 2011).
+
+mod casters;
+mod photon_map;
+
+pub use casters::{CausticCasters, CausticPoint};
+pub use photon_map::{Photon, PhotonMap};
+
+/// Samples of a pixel that gather the same photons.
+pub const EPOCH: u32 = 8;
+
+/// What paths of an epoch read.
+#[derive(Debug)]
+pub struct Caustics<'a> {
+    /// The surfaces where photons start.
+    pub casters: &'a CausticCasters,
+    /// The photons.
+    pub photons: &'a PhotonMap,
+}

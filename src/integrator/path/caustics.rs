@@ -1,0 +1,116 @@
+//! Photons gathered at vertices, and the weights of paths that find the same light by chance.
+
+use super::Context;
+use super::block::{Vertices, vertex_flags};
+use super::direct::shadowing;
+use super::radiance::Output;
+use super::wave::Wave;
+use crate::color::Rgb;
+use crate::id::{InstanceId, ShapeId};
+use crate::integrator::light_events::LightEvent;
+use crate::integrator::vertex::HemisphereTest;
+use crate::integrator::{Caustics, Photon};
+use crate::math::rows::BATCH;
+use crate::sampling::power_heuristic;
+
+/// What is known of a path that has met nothing but delta lobes since it left a surface where photons are gathered.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct CausticState {
+    /// The density of photons there over that of the path's direction, without the density of photons at their start;
+    /// 0 if there is no such surface.
+    density_ratio: f32,
+    /// The same with the density per area of choosing the last vertex as a start, and per solid angle of the light;
+    /// 0 if photons do not start there.
+    ratio_per_light_pdf: f32,
+}
+
+impl CausticState {
+    /// Weight of light that the path has met, which `light_pdf` is the density of sampling from the last vertex.
+    #[inline]
+    pub fn weight(&self, light_pdf: impl FnOnce() -> f32) -> f32 {
+        if self.ratio_per_light_pdf > 0.0 { power_heuristic(1.0, self.ratio_per_light_pdf * light_pdf()) } else { 1.0 }
+    }
+}
+
+/// By how much a delta lobe changes the product of solid angle and projected area of a beam, from `wo` to the sampled
+/// direction: nothing but for refraction, and for shading normals.
+pub(super) fn beam_ratio(vertices: &Vertices, lane: usize) -> f32 {
+    let shading = shading_ratio(vertices, lane);
+    shading / vertices.scatter.rr_factor[lane]
+}
+
+/// [`beam_ratio`] without refraction: the correction of shading normals for adjoint paths (Veach 1997, section 5.3).
+pub(super) fn shading_ratio(vertices: &Vertices, lane: usize) -> f32 {
+    let Vertices { rows, scatter, .. } = vertices;
+    let cos = scatter.direction.get(lane).dot(rows.n_g.get(lane));
+    let ratio = (cos * rows.wo.0[2][lane]) / (rows.cos_geometric[lane] * scatter.wi.0[2][lane]);
+    if ratio.is_finite() { ratio.abs() } else { 0.0 }
+}
+
+/// The state of the path that goes on from a vertex.
+pub(super) fn after(context: &Context, vertices: &Vertices, lane: usize, state: CausticState) -> CausticState {
+    let Some(Caustics { casters, photons }) = context.pass.caustics else { return state };
+    let Vertices { rows, scatter, .. } = vertices;
+    let cos = scatter.direction.get(lane).dot(rows.n_g.get(lane)).abs();
+    if scatter.is_delta[lane] == 0 {
+        let density_ratio = photons.gathered_area() * cos / scatter.pdf[lane];
+        return CausticState { density_ratio, ratio_per_light_pdf: 0.0 };
+    }
+    let density_ratio = state.density_ratio * beam_ratio(vertices, lane);
+    let pdf_area = casters.pdf_area(ShapeId(rows.shape[lane]), InstanceId(rows.instance[lane]));
+    let ratio = density_ratio * pdf_area / cos;
+    CausticState { density_ratio, ratio_per_light_pdf: if ratio.is_finite() { ratio } else { 0.0 } }
+}
+
+/// Adds the light of the photons around a block's vertices.
+pub(super) fn gather(context: &Context, wave: &mut Wave, block: usize, out: &mut Output) {
+    let Some(Caustics { photons, .. }) = context.pass.caustics else { return };
+    let Wave { vertices, light_aovs, .. } = &*wave;
+    let area = photons.gathered_area();
+    for lane in 0..vertices.count.min(BATCH) {
+        let rows = &vertices.rows;
+        if rows.flags[lane] & (vertex_flags::DELTA | vertex_flags::MISS) != 0 {
+            continue;
+        }
+        let (throughput, slot) = (rows.throughput.get(lane), rows.slot[lane]);
+        photons.for_each_near(vertices.points.p.get(lane).as_vec3(), rows.n_g.get(lane), |photon| {
+            let is_short = context.bounce + photon.scatterings + 2 <= context.config.max_depth;
+            let Some(scattered) = scattered(context, vertices, lane, photon, area).filter(|_| is_short) else { return };
+            let light = context.config.clamped(throughput * scattered, context.bounce + 1 + photon.scatterings);
+            out.add(slot, light);
+            if context.config.needs_light_aovs() {
+                let event = if context.bounce == 0 && context.config.light_aovs.by_scattering {
+                    let wi = vertices.frame(lane).to_local(photon.wi);
+                    LightEvent::Indirect(vertices.lobes(context.scene, lane, wi))
+                } else {
+                    light_aovs.event(context.bounce + 2, block * BATCH + vertices.path(lane), LightEvent::Emission)
+                };
+                out.add_to_light_aovs(context, slot, light, event, photon.light);
+            }
+        });
+    }
+}
+
+/// The radiance that a vertex scatters of a photon's light, weighted by MIS against finding it by chance.
+#[inline]
+fn scattered(context: &Context, vertices: &Vertices, lane: usize, photon: &Photon, area: f32) -> Option<Rgb> {
+    let rows = &vertices.rows;
+    let wi = vertices.frame(lane).to_local(photon.wi);
+    let cos = photon.wi.dot(rows.n_g.get(lane));
+    let test = HemisphereTest::new([rows.wo.0[2][lane], wi.z], [rows.cos_geometric[lane], cos]);
+    if !test.agrees() || cos.abs() < MIN_COS {
+        return None;
+    }
+    let eval = vertices.eval(context.scene, lane, wi);
+    let factor = if context.scene.features.normal_perturbations {
+        shadowing::<true>(test, [cos, wi.z, rows.cos_normals[lane]])
+    } else {
+        1.0
+    };
+    let weight = power_heuristic(area * photon.density * cos.abs(), eval.pdf);
+    let light = eval.value * photon.power * (factor * weight / (area * cos.abs()));
+    (!light.is_black()).then_some(light)
+}
+
+/// Photons are not gathered where they graze a surface: their density is not known there.
+const MIN_COS: f32 = 1e-4;

@@ -1,0 +1,195 @@
+//! Photons: light traced from mirrors and glass through delta lobes, by the stages of paths.
+
+use super::block::{Vertices, spawn, vertex_flags};
+use super::caustics::shading_ratio;
+use super::wave::Wave;
+use super::{Context, PathBuffers, PathIntegrator, materials, media, scatter, trace, vertices};
+use crate::color::Rgb;
+use crate::film::LightAovRequest;
+use crate::geometry::Hit;
+use crate::id::LightId;
+use crate::integrator::{
+    CameraBatch, CameraSample, CausticCasters, CausticPoint, PassContext, Photon, PhotonRange, RayCounts, SurfaceAovs,
+    Workspace, cancel, dimensions,
+};
+use crate::light::{LightSampleContext, ShadowTarget};
+use crate::math::rows::BATCH;
+use crate::math::{Ray, Vec3};
+
+/// Where photons come from.
+pub(super) struct Source<'a> {
+    pub casters: &'a CausticCasters,
+    pub range: &'a PhotonRange,
+}
+
+/// State of a photon on its way.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PhotonState {
+    /// As in [`Photon`].
+    density: f32,
+    light: LightId,
+    /// Where its ray is to arrive first.
+    start: CausticPoint,
+}
+
+/// A point counts as the start of a photon up to this part of the distance from the light.
+const START_TOLERANCE: f64 = 1e-5;
+
+/// Appends the photons that arrive.
+pub(super) fn trace(
+    config: &PathIntegrator,
+    pass: &PassContext,
+    source: &Source,
+    workspace: &mut Workspace,
+    photons: &mut Vec<Photon>,
+) {
+    // No roulette: what a photon loses at mirrors and glass is little.
+    let config = &PathIntegrator {
+        rr_depth: u32::MAX,
+        clamp: f32::INFINITY,
+        hide_emitters: false,
+        needs: SurfaceAovs::default(),
+        light_aovs: LightAovRequest::default(),
+        ..config.clone()
+    };
+    let pass = &PassContext { guide: None, caustics: None, ..*pass };
+    let (world, compensation) = (pass.world, config.strategy.compensation());
+    let mut context = Context { config, pass, world, scene: world.scene, bounce: 0, is_last: false, compensation };
+    let Workspace { counts, paths: PathBuffers(wave), .. } = workspace;
+    let mut traced = RayCounts::default();
+    start(&context, source, wave);
+    // The last segments are those to the surface that gathers, and to the camera.
+    for bounce in 0..config.max_depth.saturating_sub(1) {
+        if wave.count == 0 || (bounce % cancel::BOUNCES == 0 && pass.render.is_cancel_due()) {
+            break;
+        }
+        context.bounce = bounce;
+        trace::closest(&context, wave, &mut traced);
+        if context.scene.features.media {
+            traced.indirect += media::pass_boundaries(&context, wave);
+        }
+        let mut survivors = 0;
+        for block in 0..wave.blocks() {
+            vertices::find(&context, wave, block);
+            if bounce == 0 {
+                keep_starts(wave, block);
+            }
+            materials::evaluate(&context, wave, block);
+            materials::replace_bsdfs(&context, wave, block);
+            if bounce > 0 {
+                store(wave, block, bounce, photons);
+            }
+            materials::sort_by_bsdf(&mut wave.vertices);
+            vertices::build_frames(&context, wave);
+            wave.draw(&context);
+            scatter::sample(&context, None, wave, block);
+            keep_delta_lobes(&mut wave.vertices);
+            wave.append(&context, block, &mut survivors);
+        }
+        wave.finish_bounce(survivors);
+    }
+    traced.add(&wave.counts);
+    counts.indirect += traced.total();
+}
+
+/// Starts a photon with each index for which a light shines on the chosen point.
+fn start(context: &Context, source: &Source, wave: &mut Wave) {
+    let (mut samples, mut states, mut powers) = (CameraBatch::default(), Vec::new(), Vec::new());
+    for index in source.range.indices.clone() {
+        if let Some((sample, state, power)) = emitted(context, source, index) {
+            samples.push(&sample);
+            states.push(state);
+            powers.push(power);
+        }
+    }
+    wave.start(context, &samples);
+    wave.photons = states;
+    for (i, &power) in powers.iter().enumerate() {
+        wave.paths[i / BATCH].throughput.set(i % BATCH, power);
+    }
+}
+
+/// Light that shines on a chosen point of a caster, its state, and its power times the number of photons.
+fn emitted(context: &Context, source: &Source, index: u32) -> Option<(CameraSample, PhotonState, Rgb)> {
+    let (scene, sampler, seed) = (context.scene, &context.config.sampler, source.range.seed);
+    let [a, b, c, _] = sampler.sample_4d(seed, index, dimensions::CAMERA);
+    let start = source.casters.sample(&scene.geometry, [a, b, c]);
+    let from = LightSampleContext { p: start.p, n: Vec3::ZERO };
+    let [a, b, u, v] = sampler.sample_4d(seed, index, dimensions::light(0));
+    let choice = scene.lights.choose(&from, [a, b], context.compensation)?;
+    let light = scene.lights.get(choice.id);
+    let sample = light
+        .sample(&scene.geometry, &scene.textures, start.p, [u, v], context.compensation)
+        // Paths do not meet such lights, and what they do not find is not part of the picture.
+        .filter(|sample| !sample.is_delta)?;
+    let cos = sample.wi.dot(start.n).abs();
+    let light_pdf = choice.pmf * sample.pdf;
+    let power = sample.radiance * (cos / (light_pdf * start.pdf_area as f32));
+    let density = source.casters.pdf_area(start.shape, Hit::NO_INSTANCE) * light_pdf / cos;
+    if power.is_black() || !power.is_finite() || !density.is_finite() {
+        return None;
+    }
+    let ray = match sample.target {
+        ShadowTarget::Point(target) => target.ray_along(-sample.wi),
+        ShadowTarget::Infinity => {
+            let distance = 2.0 * context.world.accel.bounds().size().length();
+            Ray::new((start.p + sample.wi.as_dvec3() * f64::from(distance)).as_vec3(), -sample.wi)
+        }
+    };
+    Some((CameraSample { ray, seed, sample: index }, PhotonState { density, light: choice.id, start }, power))
+}
+
+/// Ends the photons whose ray has met something else than its start.
+fn keep_starts(wave: &mut Wave, block: usize) {
+    let Wave { vertices, photons, rays, .. } = wave;
+    for lane in 0..vertices.count {
+        let path = vertices.path(lane);
+        let CausticPoint { shape, prim, p, .. } = photons[block * BATCH + path].start;
+        let (rows, at) = (&mut vertices.rows, vertices.points.p.get(lane));
+        let reach = (p - rays[block].origin.get(path).as_dvec3()).length();
+        let is_start =
+            (rows.shape[lane], rows.prim[lane]) == (shape.0, prim.0) && (at - p).length() < START_TOLERANCE * reach;
+        if !is_start {
+            rows.flags[lane] |= vertex_flags::MISS;
+            rows.throughput.set(lane, Rgb::BLACK);
+        }
+    }
+}
+
+/// Stores the photons that have arrived at surfaces with other lobes than deltas.
+fn store(wave: &Wave, block: usize, scatterings: u32, photons: &mut Vec<Photon>) {
+    let Vertices { rows, points, count, .. } = &wave.vertices;
+    for lane in (0..*count).filter(|&lane| rows.flags[lane] & (vertex_flags::DELTA | vertex_flags::MISS) == 0) {
+        let PhotonState { density, light, .. } = wave.photons[block * BATCH + wave.vertices.path(lane)];
+        photons.push(Photon {
+            p: points.p.get(lane).as_vec3(),
+            n: rows.n_g.get(lane),
+            wi: -rows.direction.get(lane),
+            power: rows.throughput.get(lane),
+            density,
+            light,
+            scatterings,
+        });
+    }
+}
+
+/// Ends the photons that other lobes than deltas have scattered, and turns what paths from the camera carry into what
+/// photons carry.
+fn keep_delta_lobes(vertices: &mut Vertices) {
+    for lane in 0..vertices.count {
+        let ratio = shading_ratio(vertices, lane);
+        let scatter = &mut vertices.scatter;
+        vertices.direct.status[lane] = spawn::NONE;
+        if scatter.is_delta[lane] == 0 || !(ratio > 0.0) {
+            scatter.status[lane] = spawn::NONE;
+        }
+        let factor = scatter.rr_factor[lane] * ratio;
+        scatter.throughput.set(lane, scatter.throughput.get(lane) * factor);
+    }
+}
+
+/// The state of the photon that goes on from a vertex.
+pub(super) fn after(vertices: &Vertices, lane: usize, state: PhotonState) -> PhotonState {
+    let ratio = vertices.scatter.rr_factor[lane] / shading_ratio(vertices, lane);
+    PhotonState { density: state.density * ratio, ..state }
+}

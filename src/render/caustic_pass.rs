@@ -1,0 +1,100 @@
+//! Photons of caustics: one map for each epoch of samples.
+
+use rayon::prelude::*;
+
+use super::{Settings, TILE_SIZE};
+use crate::accel::Accelerator;
+use crate::integrator::{
+    CausticCasters, Caustics, EPOCH, Integrator, PassContext, Photon, PhotonMap, PhotonRange, RayCounts, Workspace,
+};
+use crate::math::Vec2;
+use crate::sampling::{PixelSeed, Sampler};
+use crate::scene::Scene;
+
+/// Photons traced in an epoch, by pixel of the picture.
+const PHOTONS_PER_PIXEL: f64 = 2.0;
+
+/// The most photons traced in an epoch, which take 250 MB.
+const MOST_PHOTONS: f64 = 4e6;
+
+/// Photons are gathered within this many widths of a pixel at the median distance of what the camera sees, at first.
+const RADIUS_IN_PIXELS: f32 = 2.0;
+
+/// Camera rays on each side of the picture that find this distance.
+const PROBES: u32 = 48;
+
+/// Traces photons and keeps those of one epoch.
+pub(super) struct CausticPass {
+    casters: CausticCasters,
+    traced: u32,
+    /// In the first epoch.
+    radius: f32,
+    /// The epoch, and its photons.
+    map: Option<(u32, PhotonMap)>,
+}
+
+impl CausticPass {
+    /// For a scene; `None` if nothing in it can cast caustics, or if the camera sees nothing.
+    pub fn new(scene: &Scene, accel: &dyn Accelerator, settings: &Settings) -> Option<Self> {
+        let casters = CausticCasters::new(scene)?;
+        let [width, height] = settings.size.map(f64::from);
+        let traced = (PHOTONS_PER_PIXEL * width * height).min(MOST_PHOTONS) as u32;
+        let radius = RADIUS_IN_PIXELS * median_pixel_width(scene, accel, settings.size)?;
+        Some(Self { casters, traced, radius, map: None })
+    }
+
+    /// What paths read, if there are photons.
+    pub fn caustics(&self) -> Option<Caustics<'_>> {
+        let (_, photons) = self.map.as_ref().filter(|(_, photons)| !photons.is_empty())?;
+        Some(Caustics { casters: &self.casters, photons })
+    }
+
+    /// Traces the photons of a sample's epoch, unless they are there; the result is the rays traced.
+    pub fn trace(
+        &mut self,
+        sample: u32,
+        integrator: &dyn Integrator,
+        pass: &PassContext,
+        sampler: &Sampler,
+    ) -> RayCounts {
+        let epoch = sample / EPOCH;
+        if self.map.as_ref().is_some_and(|(known, _)| *known == epoch) {
+            return RayCounts::default();
+        }
+        // Beyond all pixels.
+        let seed: PixelSeed = sampler.pixel(epoch, u32::MAX);
+        let chunk = TILE_SIZE * TILE_SIZE;
+        let parts: Vec<(Vec<Photon>, RayCounts)> = (0..self.traced.div_ceil(chunk))
+            .into_par_iter()
+            .map_init(Workspace::default, |workspace, i| {
+                let range = PhotonRange { seed, indices: i * chunk..((i + 1) * chunk).min(self.traced) };
+                let mut photons = Vec::new();
+                integrator.trace_photons(pass, &self.casters, &range, workspace, &mut photons);
+                (photons, std::mem::take(&mut workspace.counts))
+            })
+            .collect();
+        let mut counts = RayCounts::default();
+        parts.iter().for_each(|(_, part)| counts.add(part));
+        let photons: Vec<Photon> = parts.into_iter().flat_map(|(photons, _)| photons).collect();
+        // Slower than the variance falls, so that both vanish (Knaus and Zwicker 2011, with alpha = 2/3).
+        let radius = self.radius * ((epoch + 1) as f32).powf(-1.0 / 6.0);
+        self.map = Some((epoch, PhotonMap::new(&photons, self.traced, radius)));
+        counts
+    }
+}
+
+/// The median over the picture of the width of a pixel at what the camera sees.
+fn median_pixel_width(scene: &Scene, accel: &dyn Accelerator, size: [u32; 2]) -> Option<f32> {
+    let at = |i: u32, side: u32| (i as f32 + 0.5) / PROBES as f32 * side as f32;
+    let mut widths: Vec<f32> = (0..PROBES * PROBES)
+        .filter_map(|i| {
+            let film = Vec2::new(at(i % PROBES, size[0]), at(i / PROBES, size[1]));
+            let ray = scene.camera.ray(film, size, [0.5; 2], 0.0);
+            let hit = accel.intersect(&ray)?;
+            Some(scene.camera.pixel_cone(&ray, size).width_at(hit.t))
+        })
+        .filter(|width| *width > 0.0 && width.is_finite())
+        .collect();
+    widths.sort_unstable_by(f32::total_cmp);
+    widths.get(widths.len() / 2).copied()
+}
