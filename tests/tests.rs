@@ -21,6 +21,8 @@ mod bench_scale;
 mod bench_stability;
 /// What the cameras of the scene file see.
 mod cameras;
+/// Light that mirrors and glass throw on other surfaces, by photons.
+mod caustics;
 /// Renders that go on where they were stopped.
 mod checkpoints;
 /// The program as a user runs it: exit codes, files, messages.

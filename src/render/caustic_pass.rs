@@ -1,20 +1,23 @@
 //! Photons of caustics: one map for each epoch of samples.
 
+use std::sync::{Mutex, PoisonError};
+
 use rayon::prelude::*;
 
+use super::tile_renderer::TileWorkspace;
 use super::{Settings, TILE_SIZE};
 use crate::accel::Accelerator;
 use crate::integrator::{
-    CausticCasters, Caustics, EPOCH, Integrator, PassContext, Photon, PhotonMap, PhotonRange, RayCounts, Workspace,
+    CausticCasters, Caustics, EPOCH, Integrator, PassContext, Photon, PhotonMap, PhotonRange, RayCounts,
 };
 use crate::math::Vec2;
 use crate::sampling::{PixelSeed, Sampler};
 use crate::scene::Scene;
 
 /// Photons traced in an epoch, by pixel of the picture.
-const PHOTONS_PER_PIXEL: f64 = 2.0;
+const PHOTONS_PER_PIXEL: f64 = 0.25;
 
-/// The most photons traced in an epoch, which take 250 MB.
+/// The most photons traced in an epoch, which take 300 MB.
 const MOST_PHOTONS: f64 = 4e6;
 
 /// Photons are gathered within this many widths of a pixel at the median distance of what the camera sees, at first.
@@ -56,6 +59,7 @@ impl CausticPass {
         integrator: &dyn Integrator,
         pass: &PassContext,
         sampler: &Sampler,
+        workspaces: &[Mutex<TileWorkspace>],
     ) -> RayCounts {
         let epoch = sample / EPOCH;
         if self.map.as_ref().is_some_and(|(known, _)| *known == epoch) {
@@ -66,11 +70,13 @@ impl CausticPass {
         let chunk = TILE_SIZE * TILE_SIZE;
         let parts: Vec<(Vec<Photon>, RayCounts)> = (0..self.traced.div_ceil(chunk))
             .into_par_iter()
-            .map_init(Workspace::default, |workspace, i| {
+            .map(|i| {
                 let range = PhotonRange { seed, indices: i * chunk..((i + 1) * chunk).min(self.traced) };
+                let thread = rayon::current_thread_index().unwrap_or(0) % workspaces.len();
+                let mut workspace = workspaces[thread].lock().unwrap_or_else(PoisonError::into_inner);
                 let mut photons = Vec::new();
-                integrator.trace_photons(pass, &self.casters, &range, workspace, &mut photons);
-                (photons, std::mem::take(&mut workspace.counts))
+                integrator.trace_photons(pass, &self.casters, &range, &mut workspace.integrator, &mut photons);
+                (photons, std::mem::take(&mut workspace.integrator.counts))
             })
             .collect();
         let mut counts = RayCounts::default();

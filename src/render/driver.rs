@@ -114,7 +114,7 @@ impl Driver<'_> {
                 break;
             }
             let start = Instant::now();
-            let mut rays = self.pool.install(|| self.renderer.trace_photons(pass.samples.start));
+            let mut rays = self.pool.install(|| self.renderer.trace_photons(pass.samples.start, &self.workspaces));
             rays.add(&self.render_pass(state, &pass));
             state.rays.add(&rays);
             if self.cancel.is_cancelled() {

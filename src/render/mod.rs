@@ -26,6 +26,7 @@ pub use state::{Checkpoints, Header, Merged, RenderState, Shard, StateFile, chec
 pub use trained_guide::TrainedGuide;
 
 use std::sync::atomic::AtomicBool;
+use std::sync::{Mutex, PoisonError};
 
 use pixel_order::{slot_of_pixel, slots};
 use tile_renderer::{TileRenderer, TileWorkspace};
@@ -163,10 +164,12 @@ pub fn replay(
         ));
     }
     let mut renderer = TileRenderer::new(scene, accel, settings);
-    renderer.trace_photons(sample);
+    let workspace = [Mutex::<TileWorkspace>::default()];
+    renderer.trace_photons(sample, &workspace);
+    let [workspace] = workspace;
+    let mut workspace = workspace.into_inner().unwrap_or_else(PoisonError::into_inner);
     let pixel = pixel.map(|x| x + renderer.grid.offset);
     let origin = pixel.map(|x| x / TILE_SIZE * TILE_SIZE);
-    let mut workspace = TileWorkspace::default();
     renderer.render_batch(origin, sample, None, &mut workspace);
     let slot = slot_of_pixel([pixel[0] - origin[0], pixel[1] - origin[1]]);
     let place = slots(renderer.grid.area, origin).position(|other| other == slot);

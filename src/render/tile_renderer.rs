@@ -1,6 +1,7 @@
 //! Samples of the pixels of a tile: camera rays, the integrator, and the film.
 
 use std::ops::Range;
+use std::sync::Mutex;
 
 use super::caustic_pass::CausticPass;
 use super::pixel_order::{pixel_of_slot, slots};
@@ -121,9 +122,9 @@ impl<'a> TileRenderer<'a> {
     }
 
     /// Traces the photons of a sample's epoch, unless they are there; the result is the rays traced.
-    pub fn trace_photons(&mut self, sample: u32) -> RayCounts {
+    pub fn trace_photons(&mut self, sample: u32, workspaces: &[Mutex<TileWorkspace>]) -> RayCounts {
         let Some(mut caustics) = self.caustics.take() else { return RayCounts::default() };
-        let counts = caustics.trace(sample, self.integrator.as_ref(), &self.pass(None), &self.sampler);
+        let counts = caustics.trace(sample, self.integrator.as_ref(), &self.pass(None), &self.sampler, workspaces);
         self.caustics = Some(caustics);
         counts
     }

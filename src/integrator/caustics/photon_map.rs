@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use crate::color::Rgb;
 use crate::id::LightId;
 use crate::math::Vec3;
+use crate::math::float::floor;
 use crate::math::random::hash64;
 
 /// Light that arrives at a surface after one delta lobe or more.
@@ -21,7 +22,7 @@ pub struct Photon {
     /// Power times the number of photons traced.
     pub power: Rgb,
     /// Density with which photons arrive, per area and solid angle, over the cosine of `wi` and `n`; choices between
-    /// lobes left out.
+    /// lobes left out; infinite for delta lights, which paths never meet.
     pub density: f32,
     /// The light that it comes from.
     pub light: LightId,
@@ -29,35 +30,65 @@ pub struct Photon {
     pub scatterings: u32,
 }
 
-/// Photons in the cells of a grid, of which a hash table has those that are not empty.
+/// Photons in the cells of a grid. Blocks of 4 x 4 x 4 cells that hold photons are in a hash table.
 #[derive(Debug)]
 pub struct PhotonMap {
-    /// By bucket.
+    /// By block and cell.
     photons: Vec<Photon>,
-    /// By bucket, its first photon, and the number of photons.
+    /// The same photons' points, apart from what only those that are gathered need.
+    points: Vec<Vec3>,
+    /// By cell that holds photons, its first one, and the number of photons.
     starts: Vec<u32>,
+    /// A hash table with linear probing; at most half of it is in use.
+    table: Vec<Block>,
     radius: f32,
     traced: u32,
+}
+
+/// 4 x 4 x 4 cells.
+#[derive(Clone, Copy, Debug, Default)]
+struct Block {
+    place: [i32; 3],
+    /// Index of its first cell in the starts.
+    first: u32,
+    /// A bit for each cell that holds photons; 0 for an entry that is not in use.
+    cells: u64,
 }
 
 impl PhotonMap {
     /// The photons that arrived of `traced` ones, to be gathered within a positive `radius`.
     pub fn new(photons: &[Photon], traced: u32, radius: f32) -> Self {
-        let buckets = (2 * photons.len()).next_power_of_two();
-        let mut map = Self { photons: Vec::new(), starts: Vec::new(), radius, traced };
-        let bucket = |photon: &Photon| bucket(map.cell(photon.p), buckets);
-        let mut order: Vec<(u32, u32)> =
-            photons.par_iter().enumerate().map(|(i, photon)| (bucket(photon), i as u32)).collect();
+        let mut map =
+            Self { photons: Vec::new(), points: Vec::new(), starts: Vec::new(), table: Vec::new(), radius, traced };
+        let key = |(i, photon): (usize, &Photon)| {
+            let cell = map.cell(photon.p);
+            (block_of(cell), bit(cell), i as u32)
+        };
+        let mut order: Vec<_> = photons.par_iter().enumerate().map(key).collect();
         order.par_sort_unstable();
-        let mut starts = vec![0; buckets + 1];
-        for &(bucket, _) in &order {
-            starts[bucket as usize + 1] += 1;
+        let mut blocks: Vec<Block> = Vec::new();
+        let mut previous = None;
+        for (start, &(place, bit, _)) in order.iter().enumerate() {
+            if previous == Some((place, bit)) {
+                continue;
+            }
+            if previous.is_none_or(|(previous, _)| previous != place) {
+                blocks.push(Block { place, first: map.starts.len() as u32, cells: 0 });
+            }
+            if let Some(block) = blocks.last_mut() {
+                block.cells |= 1 << bit;
+            }
+            map.starts.push(start as u32);
+            previous = Some((place, bit));
         }
-        for i in 0..buckets {
-            starts[i + 1] += starts[i];
+        map.starts.push(order.len() as u32);
+        map.photons = order.iter().map(|&(_, _, i)| photons[i as usize]).collect();
+        map.points = map.photons.iter().map(|photon| photon.p).collect();
+        map.table = vec![Block::default(); (2 * blocks.len()).next_power_of_two()];
+        for block in blocks {
+            let free = map.entry(block.place);
+            map.table[free] = block;
         }
-        map.photons = order.iter().map(|&(_, i)| photons[i as usize]).collect();
-        map.starts = starts;
         map
     }
 
@@ -75,42 +106,71 @@ impl PhotonMap {
     /// Visits the photons around a point of a surface with the unit geometric normal `n`.
     #[inline]
     pub fn for_each_near(&self, p: Vec3, n: Vec3, mut visit: impl FnMut(&Photon)) {
-        let buckets = self.starts.len() - 1;
         let ([x0, y0, z0], [x1, y1, z1]) = (self.cell(p - self.radius), self.cell(p + self.radius));
+        let mut block = Block::default();
+        // What `block` was found for.
+        let mut found = None;
         for z in z0..=z1 {
             for y in y0..=y1 {
                 for x in x0..=x1 {
-                    let bucket = bucket([x, y, z], buckets) as usize;
-                    for photon in &self.photons[self.starts[bucket] as usize..self.starts[bucket + 1] as usize] {
-                        // Cells share buckets.
-                        if self.is_near(photon, p, n) && self.cell(photon.p) == [x, y, z] {
-                            visit(photon);
-                        }
+                    let place = block_of([x, y, z]);
+                    if found != Some(place) {
+                        (block, found) = (self.table[self.entry(place)], Some(place));
+                    }
+                    let bit = bit([x, y, z]);
+                    if block.cells >> bit & 1 != 0 {
+                        let cell = block.first + (block.cells & ((1 << bit) - 1)).count_ones();
+                        self.visit_cell(cell as usize, p, n, &mut visit);
                     }
                 }
             }
         }
     }
 
-    /// Whether a photon has arrived within the radius of a point, on a surface that is about the same there.
     #[inline]
-    fn is_near(&self, photon: &Photon, p: Vec3, n: Vec3) -> bool {
-        let d = photon.p - p;
-        d.length_squared() < self.radius * self.radius
-            && d.dot(n).abs() < 0.5 * self.radius
-            && photon.n.dot(n).abs() > 0.7
+    fn visit_cell(&self, cell: usize, p: Vec3, n: Vec3, visit: &mut impl FnMut(&Photon)) {
+        for i in self.starts[cell] as usize..self.starts[cell + 1] as usize {
+            let d = self.points[i] - p;
+            if d.length_squared() < self.radius * self.radius && self.is_on_surface(i, d, n) {
+                visit(&self.photons[i]);
+            }
+        }
+    }
+
+    /// Whether a photon at a distance `d` has arrived on a surface that is about the same.
+    #[inline]
+    fn is_on_surface(&self, i: usize, d: Vec3, n: Vec3) -> bool {
+        d.dot(n).abs() < 0.5 * self.radius && self.photons[i].n.dot(n).abs() > 0.7
     }
 
     /// Cells are as wide as what is gathered.
     #[inline]
     fn cell(&self, p: Vec3) -> [i32; 3] {
-        (p * (0.5 / self.radius)).to_array().map(|x| x.floor() as i32)
+        let scaled = p * (0.5 / self.radius);
+        [floor(scaled.x) as i32, floor(scaled.y) as i32, floor(scaled.z) as i32]
+    }
+
+    /// The entry of a block's place, in use or not.
+    #[inline]
+    fn entry(&self, place: [i32; 3]) -> usize {
+        let [x, y, z] = place;
+        let mask = self.table.len() - 1;
+        let mut entry = hash64(hash64(u64::from(x as u32) << 32 | u64::from(y as u32)) ^ z as u64) as usize & mask;
+        while self.table[entry].cells != 0 && self.table[entry].place != place {
+            entry = (entry + 1) & mask;
+        }
+        entry
     }
 }
 
-/// The bucket of a cell, of a power of two.
+/// The block that a cell lies in.
 #[inline]
-fn bucket([x, y, z]: [i32; 3], buckets: usize) -> u32 {
-    let [x, y, z] = [x, y, z].map(|x| u64::from(x as u32));
-    (hash64(hash64(x << 32 | y) ^ z) & (buckets as u64 - 1)) as u32
+fn block_of([x, y, z]: [i32; 3]) -> [i32; 3] {
+    [x >> 2, y >> 2, z >> 2]
+}
+
+/// A cell's bit in its block.
+#[inline]
+fn bit([x, y, z]: [i32; 3]) -> u32 {
+    ((z & 3) << 4 | (y & 3) << 2 | (x & 3)) as u32
 }

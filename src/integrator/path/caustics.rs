@@ -107,7 +107,8 @@ fn scattered(context: &Context, vertices: &Vertices, lane: usize, photon: &Photo
     } else {
         1.0
     };
-    let weight = power_heuristic(area * photon.density * cos.abs(), eval.pdf);
+    let density = area * photon.density * cos.abs();
+    let weight = if density.is_finite() { power_heuristic(density, eval.pdf) } else { 1.0 };
     let light = eval.value * photon.power * (factor * weight / (area * cos.abs()));
     (!light.is_black()).then_some(light)
 }

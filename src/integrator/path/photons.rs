@@ -118,15 +118,15 @@ fn emitted(context: &Context, source: &Source, index: u32) -> Option<(CameraSamp
     let [a, b, u, v] = sampler.sample_4d(seed, index, dimensions::light(0));
     let choice = scene.lights.choose(&from, [a, b], context.compensation)?;
     let light = scene.lights.get(choice.id);
-    let sample = light
-        .sample(&scene.geometry, &scene.textures, start.p, [u, v], context.compensation)
-        // Paths do not meet such lights, and what they do not find is not part of the picture.
-        .filter(|sample| !sample.is_delta)?;
+    let sample = light.sample(&scene.geometry, &scene.textures, start.p, [u, v], context.compensation)?;
     let cos = sample.wi.dot(start.n).abs();
     let light_pdf = choice.pmf * sample.pdf;
     let power = sample.radiance * (cos / (light_pdf * start.pdf_area as f32));
+    // Paths never meet a delta light: its photons have the whole weight.
+    let is_only_way = sample.is_delta;
     let density = source.casters.pdf_area(start.shape, Hit::NO_INSTANCE) * light_pdf / cos;
-    if power.is_black() || !power.is_finite() || !density.is_finite() {
+    let density = if is_only_way { f32::INFINITY } else { density };
+    if power.is_black() || !power.is_finite() || density.is_nan() || (density.is_infinite() && !is_only_way) {
         return None;
     }
     let ray = match sample.target {

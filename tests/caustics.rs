@@ -1,0 +1,220 @@
+//! Caustics by photons: the same picture as paths find by chance, with less noise, and the same bits however a render
+//! is split.
+
+use std::sync::atomic::AtomicBool;
+
+use serde_json::{Value, json};
+use steradian::accel::{self, AccelKind};
+use steradian::desc::CausticsDesc;
+use steradian::error::Error;
+use steradian::film::{Image, LayerKind};
+use steradian::math::Rng;
+use steradian::render::{self, Overrides, Shard, StateFile};
+
+use crate::checkpoints::{Kit, StopAfter, bits};
+use crate::util::render::{assert_blocks_agree, block_means, prepare, render_with};
+
+/// A floor and a wall beside these shapes, lit by a lamp so large that paths meet it.
+fn scene_of(shapes: &Value, materials: &Value) -> Value {
+    let mut scene = json!({
+        "camera": { "position": [0, 1.6, 4], "look_at": [0, 0.4, 0], "vertical_fov_degrees": 40 },
+        "film": { "width": 32, "height": 32, "filter": { "type": "box" } },
+        "integrator": { "type": "path", "max_depth": 8 },
+        "materials": { "white": { "type": "diffuse", "albedo": 0.6 } },
+        "shapes": [
+            { "type": "quad", "material": "white", "origin": [-3, 0, 3], "edge_u": [6, 0, 0], "edge_v": [0, 0, -6] },
+            { "type": "quad", "material": "white", "origin": [-3, 0, -2], "edge_u": [6, 0, 0], "edge_v": [0, 3, 0] },
+            { "type": "quad", "material": "white", "origin": [-1, 2.5, -1], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2],
+              "emission": { "radiance": [6, 5, 4] } }
+        ]
+    });
+    scene["shapes"].as_array_mut().unwrap().extend(shapes.as_array().unwrap().iter().cloned());
+    scene["materials"].as_object_mut().unwrap().extend(materials.as_object().unwrap().clone());
+    scene
+}
+
+/// Glass, a mirror, and a rough metal that photons are gathered on.
+fn balls() -> Value {
+    scene_of(
+        &json!([
+            { "type": "sphere", "material": "glass", "radius": 0.5, "transform": [{ "translate": [-0.6, 0.5, 0.3] }] },
+            { "type": "sphere", "material": "mirror", "radius": 0.4, "transform": [{ "translate": [0.7, 0.4, 0.2] }] },
+            { "type": "cube", "material": "gold", "transform": [{ "scale": 0.3 }, { "translate": [0.1, 0.3, 0.9] }] }
+        ]),
+        &json!({
+            "glass": { "type": "dielectric" }, "mirror": { "type": "mirror" },
+            "gold": { "type": "conductor", "metal": "gold", "roughness": 0.5 }
+        }),
+    )
+}
+
+/// A coat whose mirror is one of several lobes, a pane, and glass with the normals of a smooth surface on coarse facets.
+fn coats() -> Value {
+    let corner = |x: f64, z: f64| json!([x, 0.45 - 0.5 * (x * x + z * z), z]);
+    let at = |i: u32, j: u32| corner(0.4 * f64::from(i) - 0.6, 0.4 * f64::from(j) - 0.6);
+    let vertices: Vec<Value> = (0..16).map(|k| at(k % 4, k / 4)).collect();
+    let cells = (0..9).map(|k| k / 3 * 4 + k % 3);
+    let indices: Vec<[u32; 3]> = cells.flat_map(|a| [[a, a + 4, a + 1], [a + 1, a + 4, a + 5]]).collect();
+    scene_of(
+        &json!([
+            { "type": "mesh", "material": "glass", "positions": vertices, "triangles": indices, "shading": "smooth" },
+            { "type": "quad", "material": "pane", "origin": [0.8, 0, 1], "edge_u": [0, 0, -2], "edge_v": [0.3, 1.2, 0] },
+            { "type": "sphere", "material": "coat", "radius": 0.4, "transform": [{ "translate": [-1.3, 0.4, 0] }] }
+        ]),
+        &json!({
+            "glass": { "type": "dielectric", "ior": 1.3 }, "pane": { "type": "thin_dielectric" },
+            "coat": { "type": "plastic", "albedo": [0.7, 0.2, 0.1] }
+        }),
+    )
+}
+
+fn of(scene: &Value, caustics: CausticsDesc, overrides: &Overrides) -> Image {
+    let overrides = Overrides { caustics: Some(caustics), ..overrides.clone() };
+    render_with(&prepare(scene, &overrides), AccelKind::EMBREE).image
+}
+
+fn of_seed(scene: &Value, caustics: CausticsDesc, seed: u64, spp: u32) -> Image {
+    of(scene, caustics, &Overrides { seed: Some(seed), spp: Some(spp), ..Overrides::default() })
+}
+
+/// By Welch's test on blocks of pixels: wrong densities of either technique would be seen where both find the light.
+#[test]
+fn photons_and_paths_have_the_same_mean() {
+    for (what, scene) in [("balls", balls()), ("coats", coats())] {
+        let blocks = |caustics, first: u64| -> Vec<Vec<f64>> {
+            (first..first + 8).map(|seed| block_means(&of_seed(&scene, caustics, seed, 128))).collect()
+        };
+        assert_blocks_agree(&blocks(CausticsDesc::Photons, 0), &blocks(CausticsDesc::Paths, 100), what);
+    }
+}
+
+/// Two renders differ by twice the variance of one.
+#[test]
+fn photons_lower_the_error_of_a_small_lamp_behind_glass() {
+    let mut scene = balls();
+    scene["shapes"][2] = json!({
+        "type": "sphere", "material": "white", "radius": 0.05, "transform": [{ "translate": [0, 2.5, 0] }],
+        "emission": { "radiance": [900, 800, 700] }
+    });
+    let difference = |caustics| {
+        let [a, b] = [1, 2].map(|seed| of_seed(&scene, caustics, seed, 32));
+        let (a, b) = (a.layer(LayerKind::Color).unwrap(), b.layer(LayerKind::Color).unwrap());
+        a.data.iter().zip(&b.data).map(|(a, b)| f64::from(a - b).powi(2) / (f64::from(*b).powi(2) + 0.01)).sum::<f64>()
+    };
+    let (photons, paths) = (difference(CausticsDesc::Photons), difference(CausticsDesc::Paths));
+    assert!(photons < 0.2 * paths, "{photons} {paths}");
+}
+
+/// Paths never meet a point light. A mirror shows a second one to the floor, so that the irradiance is known.
+#[test]
+fn photons_find_the_caustics_of_point_lights() {
+    let mut scene = json!({
+        "camera": { "type": "orthographic", "position": [1, 2, 0], "look_at": [1, 0, 0], "up": [0, 0, 1], "view_height": 0.2 },
+        "film": { "width": 8, "height": 8, "filter": { "type": "box" } },
+        "integrator": { "type": "path", "max_depth": 3 },
+        "materials": { "white": { "type": "diffuse", "albedo": 0.5 }, "mirror": { "type": "mirror" } },
+        "shapes": [
+            { "type": "quad", "material": "white", "origin": [0, 0, 3], "edge_u": [6, 0, 0], "edge_v": [0, 0, -6] },
+            { "type": "quad", "material": "mirror", "origin": [0, 0, -3], "edge_u": [0, 0, 6], "edge_v": [0, 4, 0] }
+        ],
+        "lights": [{ "type": "point", "position": [1, 1, 0], "intensity": [1, 1, 1] }]
+    });
+    let mean = |scene: &Value, caustics, spp| {
+        let image = of(scene, caustics, &Overrides { spp: Some(spp), ..Overrides::default() });
+        block_means(&image).iter().sum::<f64>() / block_means(&image).len() as f64
+    };
+    // The light above the floor, and its image 2 behind the mirror: cosines over squares of distances.
+    let (direct, mirrored) = (1.0, 5f64.powf(-1.5));
+    let radiance = |irradiance: f64| 0.5 / std::f64::consts::PI * irradiance;
+    let both = mean(&scene, CausticsDesc::Photons, 1024);
+    let without = mean(&scene, CausticsDesc::Paths, 64);
+    assert!((without / radiance(direct) - 1.0).abs() < 0.01, "{without}");
+    // 8 x 8 pixels and 128 maps of photons: 0.5 % is five standard errors, measured over seeds.
+    let found = (both - without) / radiance(mirrored);
+    assert!((found - 1.0).abs() < 0.05, "{found}");
+    // Too short for them.
+    scene["integrator"]["max_depth"] = json!(2);
+    assert!((mean(&scene, CausticsDesc::Photons, 64) / radiance(direct) - 1.0).abs() < 0.01);
+}
+
+#[test]
+fn pictures_with_photons_do_not_depend_on_threads_or_accelerators() {
+    let image = |threads, kind| {
+        let overrides = Overrides {
+            threads: Some(threads),
+            caustics: Some(CausticsDesc::Photons),
+            spp: Some(12),
+            ..Overrides::default()
+        };
+        render_with(&prepare(&balls(), &overrides), kind).image
+    };
+    let first = image(1, AccelKind::EMBREE);
+    assert!([2, 3].into_iter().all(|threads| image(threads, AccelKind::EMBREE) == first));
+    assert_ne!(first, of_seed(&balls(), CausticsDesc::Paths, 0, 12));
+}
+
+/// Without mirrors and glass there are no photons.
+#[test]
+fn scenes_without_mirrors_and_glass_stay_what_they_are() {
+    let scene = scene_of(&json!([]), &json!({}));
+    assert_eq!(of_seed(&scene, CausticsDesc::Photons, 0, 8), of_seed(&scene, CausticsDesc::Paths, 0, 8));
+}
+
+#[test]
+fn renders_with_photons_are_resumed_split_and_replayed() {
+    let overrides =
+        Overrides { caustics: Some(CausticsDesc::Photons), spp: Some(21), threads: Some(2), ..Overrides::default() };
+    let kit = Kit::new(&balls(), &overrides);
+    let whole = kit.render(Shard::WHOLE);
+    let folder = tempfile::tempdir().unwrap();
+    let file = StateFile::take(&folder.path().join("a.state")).unwrap();
+    let mut rng = Rng::new(3);
+    let mut state = kit.start(Shard::WHOLE);
+    while !state.complete {
+        let stop = AtomicBool::new(false);
+        let progress = StopAfter { tiles: (1 + rng.below(5) as u32).into(), stop: &stop };
+        state = kit.kept(&kit.go_on(state, &progress, &stop), &file);
+    }
+    assert!(bits(&state.film) == bits(&whole.film));
+
+    let shards = (1..=3).map(|index| Shard { index, count: 3 });
+    let paths = shards.map(|shard| {
+        let path = folder.path().join(format!("{}.shard", shard.index));
+        kit.kept(&kit.render(shard), &StateFile::take(&path).unwrap());
+        path
+    });
+    let paths: Vec<_> = paths.collect();
+    let merged = render::merge(&paths, false).unwrap();
+    assert!(merged.state.film.resolve() == whole.film.resolve());
+
+    let accel = accel::build(AccelKind::EMBREE, &kit.prepared.scene.geometry, 1).unwrap();
+    let replay =
+        |sample| render::replay(&kit.prepared.scene, &*accel, &kit.prepared.settings, [17, 20], sample).unwrap().pixel;
+    let single = Kit::new(&balls(), &Overrides { crop: Some([17, 20, 1, 1]), ..overrides });
+    let mean = (0..21).map(|i| f64::from(replay(i).radiance.r)).sum::<f64>() / 21.0;
+    let of_picture = f64::from(single.render(Shard::WHOLE).film.resolve().pixel(LayerKind::Color, 17, 20).unwrap()[0]);
+    assert!((mean / of_picture - 1.0).abs() < 1e-5, "{mean} {of_picture}");
+}
+
+#[test]
+fn what_photons_cannot_do_is_refused() {
+    let refusal = |scene: &Value, overrides: &Overrides| {
+        let desc = serde_json::from_value(scene.clone()).unwrap();
+        match render::Settings::new(&desc, overrides) {
+            Err(Error::Usage(message)) => message,
+            other => panic!("{other:?}"),
+        }
+    };
+    let on = Overrides { caustics: Some(CausticsDesc::Photons), ..Overrides::default() };
+    for (overrides, option) in [
+        (Overrides { target_error: Some(0.01), ..on.clone() }, "--target-error"),
+        (Overrides { guiding: Some(true), ..on.clone() }, "--guiding on"),
+        (Overrides { regularize: Some(0.1), ..on.clone() }, "--regularize"),
+    ] {
+        let message = refusal(&balls(), &overrides);
+        assert!(message.starts_with("--caustics photons") && message.contains(option), "{message}");
+    }
+    let mut normals = balls();
+    normals["integrator"] = json!({ "type": "normal" });
+    assert!(refusal(&normals, &on).starts_with("--caustics"));
+}
