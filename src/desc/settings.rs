@@ -235,7 +235,7 @@ pub enum IntegratorDesc {
         /// such as through a door ajar, for some time of learning. Default: false.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         guiding: bool,
-        /// How the light is found that mirrors and clear glass throw on other surfaces.
+        /// How caustics are found: light that mirrors and clear glass throw on other surfaces. Default: paths.
         #[serde(default, skip_serializing_if = "CausticsDesc::is_default")]
         caustics: CausticsDesc,
     },
@@ -342,15 +342,16 @@ pub enum StrategyDesc {
     Bsdf,
 }
 
-/// How the light is found that mirrors and clear glass throw on other surfaces.
+/// How caustics are found: light that mirrors and clear glass throw on other surfaces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CausticsDesc {
-    /// By chance, when a scattered ray meets a light by way of mirrors and glass: no bias, much noise.
+    /// By chance, where a scattered ray meets a light by way of mirrors and glass: unbiased, with much noise. Those of
+    /// point, spot, projector and distant lights are missing.
     #[default]
     Paths,
-    /// Also by photons from the lights: little noise. They blur the light by about two pixels; the blur vanishes as
-    /// samples are added.
+    /// Also by photons traced from all lights: little noise. They blur caustics by up to two pixels; the blur vanishes
+    /// as samples are added.
     Photons,
 }
 

@@ -237,7 +237,10 @@ pub struct RenderArgs {
     /// less noise of caustics, but biased. Off by default; 0 for off
     #[arg(long, value_name = "ALPHA", help_heading = "Algorithm")]
     pub regularize: Option<f32>,
-    /// How the light is found that mirrors and clear glass throw on other surfaces
+    /// Caustics, the light that mirrors and clear glass throw on other surfaces: paths or photons
+    ///
+    /// Photons blur them by up to two pixels, less with more samples, and find those of point and distant lights too.
+    /// Not with --guiding, --guide, --target-error or --regularize. Default: paths
     #[arg(long, value_name = "NAME", value_parser = names::plain::<CausticsDesc>(), help_heading = "Algorithm")]
     pub caustics: Option<CausticsDesc>,
     /// Path guiding: sample directions by the incident radiance learned from earlier paths: on or off

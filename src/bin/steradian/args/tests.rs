@@ -2,7 +2,7 @@
 
 use super::*;
 use clap::CommandFactory;
-use steradian::desc::LayerKind;
+use steradian::desc::{CausticsDesc, LayerKind};
 
 fn render(arguments: &[&str]) -> Result<RenderArgs, clap::Error> {
     let line = ["steradian", "render", "a.json"].iter().chain(arguments);
@@ -21,7 +21,7 @@ fn the_definition_is_sound() {
 fn every_option_reaches_the_overrides() {
     let line = "-o a.exr -o b.png --spp 5 --size 20x10 --crop 1,2,3,4 --threads 2 --seed 9 --integrator path \
                 --accel linear --sampler independent --max-depth 3 --strategy light --clamp 2.5 --regularize 0.2 \
-                --guiding on --time-limit 1.5 --layers Z,albedo --float --exposure -1.5 --view filmic \
+                --caustics photons --guiding on --time-limit 1.5 --layers Z,albedo --float --exposure -1.5 --view filmic \
                 --no-depth-of-field --transparent -vv";
     let arguments = render(&line.split_whitespace().collect::<Vec<_>>()).unwrap();
     let o = arguments.overrides(vec!["d.exr".to_owned()]);
@@ -45,7 +45,8 @@ fn every_option_reaches_the_overrides() {
         (o.outputs, o.default_outputs),
         (vec!["a.exr".to_owned(), "b.png".to_owned()], vec!["d.exr".to_owned()])
     );
-    assert!(o.guiding == Some(true) && o.regularize == Some(0.2) && o.no_depth_of_field && o.transparent);
+    assert_eq!((o.caustics, o.guiding), (Some(CausticsDesc::Photons), Some(true)));
+    assert!(o.regularize == Some(0.2) && o.no_depth_of_field && o.transparent);
     assert_eq!((arguments.verbosity.verbose, arguments.verbosity.quiet), (2, false));
 }
 

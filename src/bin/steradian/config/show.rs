@@ -13,7 +13,7 @@ use crate::log::{self, Level};
 use crate::text;
 
 /// Options whose values a scene has, with their places in it.
-const IN_SCENES: [(&str, &[&str]); 11] = [
+const IN_SCENES: [(&str, &[&str]); 12] = [
     ("output", &["/outputs"]),
     ("spp", &["/sampler/spp"]),
     ("size", &["/film/width", "/film/height"]),
@@ -23,6 +23,7 @@ const IN_SCENES: [(&str, &[&str]); 11] = [
     ("strategy", &["/integrator/strategy"]),
     ("clamp", &["/integrator/clamp"]),
     ("regularize", &["/integrator/regularize"]),
+    ("caustics", &["/integrator/caustics"]),
     ("sampler", &["/sampler/type"]),
     ("seed", &["/sampler/seed"]),
 ];
