@@ -1,5 +1,6 @@
 //! Photons of caustics: one map for each epoch of samples.
 
+use std::ops::RangeInclusive;
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
@@ -17,8 +18,8 @@ use crate::scene::Scene;
 /// Photons traced in an epoch, by pixel of the picture.
 const PHOTONS_PER_PIXEL: f64 = 0.25;
 
-/// The most photons traced in an epoch, which take 300 MB.
-const MOST_PHOTONS: f64 = 4e6;
+/// The fewest and the most photons traced in an epoch; the most take 300 MB.
+const PHOTONS: RangeInclusive<f64> = 16_384.0..=4e6;
 
 /// Photons are gathered within this many widths of a pixel at the median distance of what the camera sees, at first.
 const RADIUS_IN_PIXELS: f32 = 2.0;
@@ -41,7 +42,7 @@ impl CausticPass {
     pub fn new(scene: &Scene, accel: &dyn Accelerator, settings: &Settings) -> Option<Self> {
         let casters = CausticCasters::new(scene)?;
         let [width, height] = settings.size.map(f64::from);
-        let traced = (PHOTONS_PER_PIXEL * width * height).min(MOST_PHOTONS) as u32;
+        let traced = (PHOTONS_PER_PIXEL * width * height).clamp(*PHOTONS.start(), *PHOTONS.end()) as u32;
         let radius = RADIUS_IN_PIXELS * median_pixel_width(scene, accel, settings.size)?;
         Some(Self { casters, traced, radius, map: None })
     }
