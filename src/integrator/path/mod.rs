@@ -146,7 +146,7 @@ impl PathIntegrator {
                 let regions = guide.map(|guide| guided::find_regions(guide, &wave.vertices));
                 direct::sample(context, regions.as_ref(), wave, block);
                 scatter::sample(context, regions.as_ref(), wave, block);
-                wave.append(context, block, &mut survivors);
+                survivors = wave.append(context, block, survivors);
             }
             wave.finish_bounce(survivors);
             trace::shadow(context, wave, out, counts);
