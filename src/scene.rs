@@ -175,8 +175,8 @@ impl Scene {
         found
     }
 
-    /// The part of a material that a ray meets, which consists of no others; `visit` is called with the parts on the way to
-    /// it.
+    /// The part of a material that a ray meets, which consists of no others; `visit` is called with the parts on the
+    /// way to it.
     fn descend(
         &self,
         mut id: MaterialId,

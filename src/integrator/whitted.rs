@@ -248,11 +248,8 @@ impl Whitted {
             let next =
                 Segment::trace(world, at.spawn(direction), cone.map(|cone| cone.moved(at.t)), current, tally.rays);
             let lobes = view.lobes.unwrap_or_else(|| LobeWeights::of_sample(&vertex.bsdf, vertex.wo, &lobe));
-            let behind = View {
-                depth: view.depth + 1,
-                throughput: view.throughput * lobe.weight * lobe.pdf,
-                lobes: Some(lobes),
-            };
+            let throughput = view.throughput * lobe.weight * lobe.pdf;
+            let behind = View { depth: view.depth + 1, throughput, lobes: Some(lobes) };
             let arriving = match &next.end {
                 Some(end) => {
                     let behind = View { throughput: behind.throughput * next.transmittance, ..behind };

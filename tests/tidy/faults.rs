@@ -50,7 +50,14 @@ fn imports_from_higher_layers_are_found_however_they_are_written() {
     assert_finds(upward_imports, "src/film/tile.rs", "use crate::bsdf::Bsdf;", &["film imports bsdf"]);
     assert_finds(upward_imports, "src/accel/mod.rs", "use crate::texture::Texture;", &["accel imports texture"]);
     assert_finds(upward_imports, "src/unknown.rs", "", &["unknown is not in the layer table"]);
-    for text in ["use crate::Error;", "use super::super::math::Vec3;", "use crate::film::Crop;", "use super::Film;"] {
+    for text in [
+        "use crate::Error;",
+        "use super::super::math::Vec3;",
+        "use crate::film::Crop;",
+        "use super::Film;",
+        "/// [`World`](crate::integrator::World)\nstruct A;",
+        "make! { /// [`World`](crate::integrator::World)\nstruct A; }",
+    ] {
         assert_accepts(upward_imports, "src/film/tile.rs", text);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use proc_macro2::TokenStream;
+use proc_macro2::{TokenStream, TokenTree};
 use syn::visit::{self, Visit};
 use syn::{ItemMod, ItemUse, Macro, Path, UseTree};
 
@@ -125,10 +125,18 @@ impl Imports {
 
     /// Paths from the crate's root in what a macro takes or makes.
     fn add_tokens(&mut self, tokens: &TokenStream) {
-        let text = tokens.to_string().replace(' ', "");
-        for path in text.split("crate::").skip(1) {
-            let name: String = path.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-            self.add(&["crate".to_owned(), name]);
+        let tokens: Vec<TokenTree> = tokens.clone().into_iter().collect();
+        for (i, token) in tokens.iter().enumerate() {
+            match token {
+                TokenTree::Group(group) => self.add_tokens(&group.stream()),
+                TokenTree::Ident(ident) if ident == "crate" => {
+                    // Two colons lie between.
+                    if let Some(TokenTree::Ident(name)) = tokens.get(i + 3) {
+                        self.add(&["crate".to_owned(), name.to_string()]);
+                    }
+                }
+                _ => {}
+            }
         }
     }
 }

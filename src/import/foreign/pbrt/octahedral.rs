@@ -37,8 +37,8 @@ pub fn direction_from_square([s, t]: [f64; 2]) -> DVec3 {
     DVec3::new(phi.cos().copysign(u) * side, phi.sin().copysign(v) * side, z)
 }
 
-/// A square equal-area image as a lat-long image of Steradian's convention, in which pbrt's z is up (y here) and its x stays.
-/// With `mirrored`, x is negated.
+/// A square equal-area image as a lat-long image of Steradian's convention, in which pbrt's z is up (y here) and its x
+/// stays. With `mirrored`, x is negated.
 pub fn lat_long(image: &RgbImage, mirrored: bool) -> RgbImage {
     // Twice as many pixels as the square has, whatever its shape.
     let height = (image.width as f64 * image.height as f64).sqrt().round().clamp(1.0, MAX_ROWS) as usize;
