@@ -412,32 +412,13 @@ impl From<TexturedMaterial> for Material {
     }
 }
 
-impl From<Lambert> for Material {
-    fn from(bsdf: Lambert) -> Self {
-        Self::Constant(Bsdf::Lambert(bsdf))
-    }
+macro_rules! from_bsdf {
+    ($($bsdf:ident),*) => {$(
+        impl From<$bsdf> for Material {
+            fn from(bsdf: $bsdf) -> Self {
+                Self::Constant(Bsdf::$bsdf(bsdf))
+            }
+        }
+    )*};
 }
-
-impl From<Mirror> for Material {
-    fn from(bsdf: Mirror) -> Self {
-        Self::Constant(Bsdf::Mirror(bsdf))
-    }
-}
-
-impl From<Conductor> for Material {
-    fn from(bsdf: Conductor) -> Self {
-        Self::Constant(Bsdf::Conductor(bsdf))
-    }
-}
-
-impl From<Dielectric> for Material {
-    fn from(bsdf: Dielectric) -> Self {
-        Self::Constant(Bsdf::Dielectric(bsdf))
-    }
-}
-
-impl From<Plastic> for Material {
-    fn from(bsdf: Plastic) -> Self {
-        Self::Constant(Bsdf::Plastic(bsdf))
-    }
-}
+from_bsdf!(Lambert, Mirror, Conductor, Dielectric, Plastic);

@@ -84,11 +84,11 @@ pub struct Scene {
     pub surfaces: Vec<Surface>,
     /// Materials, by [`MaterialId`].
     pub materials: Vec<Material>,
-    /// Reliefs, by [`NormalPerturbationId`].
+    /// Normal maps and bump maps, by [`NormalPerturbationId`].
     pub normal_perturbations: Vec<NormalPerturbation>,
     /// What surfaces have within them, by [`MediumId`].
     pub media: Media,
-    /// Reliefs of materials that are parts of others, by [`MaterialId`]; empty if there are none.
+    /// Those of materials that are parts of others, by [`MaterialId`]; empty if there are none.
     pub part_normal_perturbations: Vec<Option<NormalPerturbationId>>,
     /// Textures, by [`TextureId`](crate::id::TextureId).
     pub textures: Vec<Texture>,
@@ -175,8 +175,8 @@ impl Scene {
         found
     }
 
-    /// The part of a material that a ray meets, which consists of no others; `visit` learns of the parts on the way to
-    /// it.
+    /// The part of a material that a ray meets, which consists of no others; `visit` is called with the parts on the
+    /// way to it.
     fn descend(
         &self,
         mut id: MaterialId,

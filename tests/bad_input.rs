@@ -1,7 +1,8 @@
 //! Every fault of a scene is an error that names the file, the place and the offending word; none is a panic.
 
 use serde_json::{Value, json};
-use steradian::compile::check_settings;
+use steradian::assets::SceneSource;
+use steradian::compile::CheckedScene;
 use steradian::{ErrorKind, import};
 
 use crate::util::folder::{Folder, good_scene, set};
@@ -165,7 +166,8 @@ fn settings_out_of_range() {
         let mut scene = good_scene();
         set(&mut scene, path, value.clone());
         let file = folder.write("scene.json", scene.to_string());
-        let message = check_settings(&import::load_scene(&file).unwrap(), &file).unwrap_err().to_string();
+        let message =
+            CheckedScene::new(&import::load_scene(&file).unwrap(), SceneSource::new(&file)).unwrap_err().to_string();
         assert!(message.contains(&format!("{place}: ")), "{message}");
     }
 }

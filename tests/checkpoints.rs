@@ -348,7 +348,7 @@ fn goes_on_in_the_middle(kit: &Kit) {
     let progress = Keep { from: &path, to: &copy };
     let whole = kit.go_on_with(kit.start(Shard::WHOLE), Some(&mut checkpoints), &progress, &AtomicBool::new(false));
     let state = RenderState::read(&copy, &header, &kit.prepared.scene, &kit.prepared.settings).unwrap();
-    assert!(state.done == 0 && state.tiles_ahead > 0 && !state.complete, "{}", state.tiles_ahead);
+    assert!(state.done == 0 && state.tiles_in_partial_pass > 0 && !state.complete, "{}", state.tiles_in_partial_pass);
     let resumed = kit.go_on(state, &Silent, &AtomicBool::new(false));
     assert!(resumed.complete && bits(&resumed.film) == bits(&whole.film) && resumed.rays == whole.rays);
 }

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use half::f16;
 use serde_json::{Value, json};
 use steradian::film::{Crop, Image, Layer, LayerKind};
-use steradian::live::{Fan, Live, Options, Patience, Preview, PreviewOptions, Snapshot, Statistics};
+use steradian::live::{Fan, HttpTimeouts, Live, Options, Preview, PreviewOptions, Snapshot, Statistics};
 use steradian::render::Progress;
 
 use crate::util::program::{Running, Signal};
@@ -194,8 +194,8 @@ fn a_reader_that_takes_nothing_keeps_neither_the_render_nor_others_waiting() {
 /// Neither one that takes a little now and then nor one that takes nothing.
 #[test]
 fn slow_readers_are_disconnected_and_keep_no_picture() {
-    let patience = Patience { stall: Duration::from_millis(300), least_rate: u64::MAX };
-    let options = PreviewOptions { patience, ..PreviewOptions::default() };
+    let timeouts = HttpTimeouts { stall: Duration::from_millis(300), least_rate: u64::MAX };
+    let options = PreviewOptions { timeouts, ..PreviewOptions::default() };
     let preview = Preview::new(&options, "ball".to_owned(), Arc::new(Statistics::new(None))).unwrap();
     // Far more than the buffers of a connection hold.
     let layer = Layer::new(LayerKind::Color, vec![0.5; 2048 * 2048 * 4]);

@@ -295,7 +295,7 @@ fn a_viewer_that_never_reads_holds_nothing_up() {
     tev.offer_final(&picture);
     assert!(!tev.wait(Instant::now()));
     drop(tev);
-    // The end of the sender ends the connection, though it had an hour's patience.
+    // The end of the sender ends the connection, though it waits for an hour.
     let mut rest = BufReader::new(silent);
     eventually("closed", || {
         rest.read(&mut [0; 65536]).is_ok_and(|read| read == 0) || rest.get_ref().peer_addr().is_err()

@@ -1,36 +1,14 @@
 //! The layer table and the rules of the house, enforced on the source text.
 
-use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+/// What goes wrong is found: each rule on a source that breaks it.
+mod faults;
 /// Functions and public names.
 mod functions;
-
-/// Imports narrower than the layer number allows.
-const NARROW: &[(&str, &[&str])] = &[
-    ("accel", &["geometry", "math", "error", "id"]),
-    ("denoise", &["film", "error", "file", "math", "color", "output"]),
-    ("output", &["film", "color", "error", "desc", "file", "math"]),
-    (
-        "scene",
-        &[
-            "attribute",
-            "bsdf",
-            "camera",
-            "film",
-            "geometry",
-            "id",
-            "light",
-            "material",
-            "medium",
-            "normal_perturbation",
-            "texture",
-            "math",
-            "color",
-        ],
-    ),
-];
+/// Which modules import which.
+mod imports;
 
 /// All Rust code that is not generated.
 const CODE: &[&str] = &["build.rs", "src", "tests", "benches", "examples", "fuzz", "xtask"];
@@ -82,73 +60,47 @@ fn sources(places: &[&str]) -> Vec<Source> {
         .collect()
 }
 
-/// Modules with their layers, from the table at the top of `src/lib.rs`: a module imports only from lower layers, never
-/// sideways.
-fn layers() -> HashMap<&'static str, u32> {
-    let rows = include_str!("../src/lib.rs").lines().filter_map(|line| {
-        let (layer, modules) = line.strip_prefix("//! | ")?.trim_end_matches(" |").split_once(" | ")?;
-        Some((layer.parse().ok()?, modules))
-    });
-    let modules =
-        rows.flat_map(|(layer, modules)| modules.split(", ").map(move |module| (module.trim_matches('`'), layer)));
-    modules.collect()
-}
+/// A rule: the faults that it finds.
+type Rule = fn(&[Source]) -> Vec<String>;
 
-#[test]
-fn modules_import_only_from_lower_layers() {
-    let layers = layers();
-    let layer = |module: &str| layers.get(module).copied();
-    let mut faults = Vec::new();
-    for source in sources(&["src"]) {
-        let module = source.module();
-        if source.path.starts_with("src/bin/") || module == "lib" {
-            continue;
-        }
-        let own = layer(module).unwrap_or_else(|| panic!("{}: module {module} is not in the layer table", source.path));
-        for (line, code) in source.code() {
-            for import in code.split("crate::").skip(1) {
-                let target: String = import.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-                if target == module || target.is_empty() {
-                    continue;
-                }
-                // The crate root re-exports only the error type.
-                let target =
-                    if ["Error", "ErrorKind", "Result"].contains(&target.as_str()) { "error" } else { &target };
-                let allowed = layer(target).is_some_and(|l| l < own);
-                let narrow = NARROW.iter().find(|(m, _)| *m == module).is_none_or(|(_, list)| list.contains(&target));
-                if !allowed || !narrow {
-                    faults.push(format!("{}:{line}: {module} imports {target}", source.path));
-                }
-            }
-        }
-    }
+#[track_caller]
+fn assert_holds(rule: Rule, places: &[&str]) {
+    let faults = rule(&sources(places));
     assert!(faults.is_empty(), "\n{}", faults.join("\n"));
 }
 
 #[test]
 fn files_stay_below_the_line_limit() {
-    let long: Vec<_> = sources(CODE)
-        .iter()
-        .map(|s| (s.path.clone(), s.text.lines().count()))
-        .filter(|(_, lines)| *lines > MAX_LINES)
-        .collect();
-    assert!(long.is_empty(), "over {MAX_LINES} lines: {long:?}");
+    assert_holds(long_files, CODE);
+}
+
+fn long_files(sources: &[Source]) -> Vec<String> {
+    let lines = sources.iter().map(|source| (&source.path, source.text.lines().count()));
+    lines.filter(|(_, lines)| *lines > MAX_LINES).map(|(path, lines)| format!("{path}: {lines} lines")).collect()
 }
 
 #[test]
 fn lines_fit_in_their_columns() {
+    assert_holds(long_lines, CODE);
+}
+
+fn long_lines(sources: &[Source]) -> Vec<String> {
     let mut faults = Vec::new();
-    for source in sources(CODE) {
+    for source in sources {
         let lines = source.text.lines().enumerate().filter(|(_, line)| line.chars().count() > MAX_COLUMNS);
-        faults.extend(lines.map(|(i, _)| format!("{}:{}", source.path, i + 1)));
+        faults.extend(lines.map(|(i, _)| format!("{}:{}: over {MAX_COLUMNS} columns", source.path, i + 1)));
     }
-    assert!(faults.is_empty(), "over {MAX_COLUMNS} columns:\n{}", faults.join("\n"));
+    faults
 }
 
 #[test]
 fn unsafe_stays_in_its_home_with_a_reason() {
+    assert_holds(unsafe_code, &["src"]);
+}
+
+fn unsafe_code(sources: &[Source]) -> Vec<String> {
     let mut faults = Vec::new();
-    for source in sources(&["src"]) {
+    for source in sources {
         let lines: Vec<&str> = source.text.lines().collect();
         for (line, code) in source.code() {
             let blocks = code.contains("unsafe {") || code.contains("unsafe impl");
@@ -162,13 +114,17 @@ fn unsafe_stays_in_its_home_with_a_reason() {
             }
         }
     }
-    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+    faults
 }
 
 #[test]
 fn the_library_neither_prints_nor_exits() {
+    assert_holds(printing, &["src"]);
+}
+
+fn printing(sources: &[Source]) -> Vec<String> {
     let mut faults = Vec::new();
-    for source in sources(&["src"]).iter().filter(|s| !s.path.starts_with("src/bin/")) {
+    for source in sources.iter().filter(|s| !s.path.starts_with("src/bin/")) {
         for (line, code) in source.code() {
             let words = [
                 "println!",
@@ -185,16 +141,19 @@ fn the_library_neither_prints_nor_exits() {
             }
         }
     }
-    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+    faults
 }
 
 #[test]
 fn files_are_opened_in_one_place() {
+    assert_holds(opening, &["src"]);
+}
+
+fn opening(sources: &[Source]) -> Vec<String> {
     // The system's own files, tests, and benchmarks with their children are exempt.
     let exempt = ["src/file/", "src/bench/", "src/bin/steradian/stats.rs", "/tests/"];
     let mut faults = Vec::new();
-    for source in
-        sources(&["src"]).iter().filter(|s| !exempt.iter().any(|e| s.path.contains(e)) && !s.path.ends_with("tests.rs"))
+    for source in sources.iter().filter(|s| !exempt.iter().any(|e| s.path.contains(e)) && !s.path.ends_with("tests.rs"))
     {
         for (line, code) in source.code().take_while(|(_, code)| !code.contains("#[cfg(test)]")) {
             let words = [
@@ -213,14 +172,18 @@ fn files_are_opened_in_one_place() {
             }
         }
     }
-    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+    faults
 }
 
 #[test]
 fn tolerances_live_in_one_place() {
+    assert_holds(tolerances, &["src"]);
+}
+
+fn tolerances(sources: &[Source]) -> Vec<String> {
     // Powers of ten that look like distances: `1e-4` and the like next to an origin, a t_min or an offset.
     let mut faults = Vec::new();
-    for source in sources(&["src"]).iter().filter(|s| s.path != "src/math/float.rs") {
+    for source in sources.iter().filter(|s| s.path != "src/math/float.rs") {
         for (line, code) in source.code() {
             let small = ["1e-3", "1e-4", "1e-5", "0.001", "0.0001"].iter().any(|n| code.contains(n));
             let place = ["t_min", "origin", "offset", "epsilon", "EPSILON"].iter().any(|n| code.contains(n));
@@ -229,7 +192,7 @@ fn tolerances_live_in_one_place() {
             }
         }
     }
-    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+    faults
 }
 
 #[test]

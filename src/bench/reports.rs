@@ -121,7 +121,7 @@ struct Subject<'g> {
 }
 
 /// One of Steradian's, or Embree.
-fn ours(kind: AccelKind) -> Build {
+fn own(kind: AccelKind) -> Build {
     Box::new(move |geometry| {
         let all = geometry.shapes.iter().map(crate::geometry::Shape::prim_count).sum::<usize>() as f64;
         let count = move |accel: &dyn Accelerator, ray: &Ray| {
@@ -156,10 +156,10 @@ struct Entry(&'static str, Option<&'static str>, bool, Build);
 fn octree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
     let entries = [
         Entry("linear as in the report", Some("120 s"), true, naive!(MatrixLinear::new)),
-        Entry("linear", None, true, ours(AccelKind::Linear)),
+        Entry("linear", None, true, own(AccelKind::Linear)),
         Entry("octree as in the report", Some("3.5 s"), false, naive!(NaiveOctree::new)),
-        Entry("octree", None, false, ours(AccelKind::Octree)),
-        Entry("embree", Some("0.5 s"), false, ours(AccelKind::EMBREE)),
+        Entry("octree", None, false, own(AccelKind::Octree)),
+        Entry("embree", Some("0.5 s"), false, own(AccelKind::EMBREE)),
     ];
     let mut comparison =
         compare("A head of 968 triangles: linear, octree, Embree", &head(968), &entries, options, watch)?;
@@ -173,7 +173,7 @@ fn octree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
             .into(),
         "Inferred: that the report timed this scene. The head here is generated, with as many triangles.".into(),
     ];
-    if let [matrices, linear, naive, ours, embree] = &comparison.rows[..] {
+    if let [matrices, linear, naive, own, embree] = &comparison.rows[..] {
         comparison.reasons = vec![
             format!(
                 "The report's linear loop multiplies three 4x4 matrices for each corner of each triangle in every \
@@ -194,9 +194,9 @@ fn octree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
                 "The report's octree is {:.1} times slower than Steradian's: cells of up to 64 triangles by their \
                  boxes in place of exact overlap ({:.1} against {:.1} triangles tested per ray), a queue without \
                  order, no end at the first hit.",
-                naive.normals.accel_seconds / ours.normals.accel_seconds,
+                naive.normals.accel_seconds / own.normals.accel_seconds,
                 naive.tests_per_ray.unwrap_or(f64::NAN),
-                ours.tests_per_ray.unwrap_or(f64::NAN),
+                own.tests_per_ray.unwrap_or(f64::NAN),
             ),
         ];
     }
@@ -205,11 +205,11 @@ fn octree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
 
 fn kd_tree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
     let entries = [
-        Entry("linear", Some("1"), true, ours(AccelKind::Linear)),
+        Entry("linear", Some("1"), true, own(AccelKind::Linear)),
         Entry("kd-tree as in the report", Some("about 10 times faster"), false, naive!(NaiveKdTree::new)),
-        Entry("kdtree:median", None, false, ours(AccelKind::KdTree(accel::KdTreeOptions { median: true }))),
-        Entry("kdtree", None, false, ours(AccelKind::KdTree(accel::KdTreeOptions { median: false }))),
-        Entry("embree", None, false, ours(AccelKind::EMBREE)),
+        Entry("kdtree:median", None, false, own(AccelKind::KdTree(accel::KdTreeOptions { median: true }))),
+        Entry("kdtree", None, false, own(AccelKind::KdTree(accel::KdTreeOptions { median: false }))),
+        Entry("embree", None, false, own(AccelKind::EMBREE)),
     ];
     let mut comparison = compare("1,000 triangles: linear, kd-tree", &bumpy_sphere(1_000), &entries, options, watch)?;
     comparison.claim = "A kd-tree is \"about 10 times\" faster than the linear loop on a mesh of 1,000 triangles.";
@@ -218,16 +218,16 @@ fn kd_tree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
         "Inferred: 1200x800 pixels of normals, as in the first comparison; the report names neither size nor rays. The \
          mesh here is generated.".into(),
     ];
-    if let [linear, naive, _, ours, _] = &comparison.rows[..] {
+    if let [linear, naive, _, own, _] = &comparison.rows[..] {
         comparison.reasons = vec![
             format!(
                 "The report's tree (axes in turn, median of lower bounds, both children visited even after a near hit) \
                  is {:.0} times faster than the linear loop within the accelerator, Steradian's {:.0} times; they test \
                  {:.1} and {:.1} triangles per ray.",
                 linear.normals.accel_seconds / naive.normals.accel_seconds,
-                linear.normals.accel_seconds / ours.normals.accel_seconds,
+                linear.normals.accel_seconds / own.normals.accel_seconds,
                 naive.tests_per_ray.unwrap_or(f64::NAN),
-                ours.tests_per_ray.unwrap_or(f64::NAN),
+                own.tests_per_ray.unwrap_or(f64::NAN),
             ),
             "The ratio grows with the mesh: linear cost is proportional to the number of triangles, a tree's to its \
              logarithm. One number for 1,000 triangles says little of 100,000."
@@ -239,7 +239,7 @@ fn kd_tree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
 
 fn bvh(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
     let entries = [
-        Entry("linear", Some("1"), true, ours(AccelKind::Linear)),
+        Entry("linear", Some("1"), true, own(AccelKind::Linear)),
         Entry(
             "BVH as in the report, wrong leaves",
             Some("17.61 times faster"),
@@ -247,9 +247,9 @@ fn bvh(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
             naive!(NaiveBvh::with_wrong_leaves),
         ),
         Entry("BVH as in the report, right leaves", None, false, naive!(NaiveBvh::new)),
-        Entry("bvh:binary", None, false, ours(AccelKind::Bvh(accel::BvhOptions { binary: true }))),
-        Entry("bvh", None, false, ours(AccelKind::Bvh(accel::BvhOptions::default()))),
-        Entry("embree", None, false, ours(AccelKind::EMBREE)),
+        Entry("bvh:binary", None, false, own(AccelKind::Bvh(accel::BvhOptions { binary: true }))),
+        Entry("bvh", None, false, own(AccelKind::Bvh(accel::BvhOptions::default()))),
+        Entry("embree", None, false, own(AccelKind::EMBREE)),
     ];
     let mut comparison = compare("70,000 triangles: linear, BVH", &bumpy_sphere(70_000), &entries, options, watch)?;
     comparison.claim = "A BVH is \"17.61 times\" faster than the linear loop on 70,580 triangles.";
@@ -263,7 +263,7 @@ fn bvh(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
          not depend on it."
             .into(),
     ];
-    if let [linear, wrong, right, _, ours, _] = &comparison.rows[..] {
+    if let [linear, wrong, right, _, own, _] = &comparison.rows[..] {
         let tests = |row: &ComparisonRow| row.tests_per_ray.unwrap_or(f64::NAN);
         comparison.reasons = vec![
             format!(
@@ -284,9 +284,9 @@ fn bvh(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
                  and Steradian's {:.0} times; on path-traced frames, which the report's were, {:.0} and {:.0} times, \
                  and the wrong leaves {:.1} times.",
                 linear.normals.accel_seconds / right.normals.accel_seconds,
-                linear.normals.accel_seconds / ours.normals.accel_seconds,
+                linear.normals.accel_seconds / own.normals.accel_seconds,
                 linear.paths.accel_seconds / right.paths.accel_seconds,
-                linear.paths.accel_seconds / ours.paths.accel_seconds,
+                linear.paths.accel_seconds / own.paths.accel_seconds,
                 linear.paths.accel_seconds / wrong.paths.accel_seconds,
             ),
         ];

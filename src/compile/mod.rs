@@ -27,7 +27,7 @@ mod summary;
 mod textures;
 mod transforms;
 
-pub use settings::{check_film_and_integrator, check_settings, check_settings_from};
+pub use settings::{CheckedScene, check_film_and_integrator};
 pub use summary::Summary;
 
 use std::fmt;
@@ -64,35 +64,44 @@ pub fn compile(desc: &SceneDesc, scene_file: &Path) -> Result<Scene> {
 /// # Errors
 /// As [`compile`].
 pub fn compile_from(desc: &SceneDesc, source: SceneSource) -> Result<Scene> {
-    let files = CompileContext::from(source);
-    let camera = settings::check(desc, &files)?;
-    let used = desc.used_names();
-    let materials = MaterialTable::new(&files, desc, &used)?;
-    let mut builder = Builder {
-        meshes: MeshStore::read(&files, desc, &used),
-        files,
-        shutter: Shutter::from(camera.shutter()),
-        surroundings: camera.places(),
-        materials,
-        geometry: Geometry::default(),
-        surfaces: Vec::new(),
-        opacities: Vec::new(),
-        paths: Vec::new(),
-        lights: LightTable::default(),
-        identities: IdentityTable::new(desc),
-        space: RenderSpace::WORLD,
-        object_spaces: Vec::new(),
-    };
-    builder.add_world(desc, &used)?;
-    builder.warn_of_coincident();
-    for (i, light) in desc.lights.iter().enumerate() {
-        let path = format!("lights[{i}]");
-        let group = builder.lights.group(&builder.files, &path, light.group())?;
-        let light = lights::compile(&builder.files, &path, light, &builder.space, &builder.materials.textures)?;
-        builder.lights.add([light], group);
+    CheckedScene::new(desc, source)?.compile()
+}
+
+impl CheckedScene<'_> {
+    /// Compiles the scene.
+    ///
+    /// # Errors
+    /// As [`compile`].
+    pub fn compile(self) -> Result<Scene> {
+        let Self { desc, files, camera } = self;
+        let used = desc.used_names();
+        let materials = MaterialTable::new(&files, desc, &used)?;
+        let mut builder = Builder {
+            meshes: MeshStore::read(&files, desc, &used),
+            files,
+            shutter: Shutter::from(camera.shutter()),
+            surroundings: camera.places(),
+            materials,
+            geometry: Geometry::default(),
+            surfaces: Vec::new(),
+            opacities: Vec::new(),
+            paths: Vec::new(),
+            lights: LightTable::default(),
+            identities: IdentityTable::new(desc),
+            space: RenderSpace::WORLD,
+            object_spaces: Vec::new(),
+        };
+        builder.add_world(desc, &used)?;
+        builder.warn_of_coincident();
+        for (i, light) in desc.lights.iter().enumerate() {
+            let path = format!("lights[{i}]");
+            let group = builder.lights.group(&builder.files, &path, light.group())?;
+            let light = lights::compile(&builder.files, &path, light, &builder.space, &builder.materials.textures)?;
+            builder.lights.add([light], group);
+        }
+        let camera = camera::place_in(&builder.files, &desc.camera, camera, builder.space)?;
+        builder.finish(desc, camera)
     }
-    let camera = camera::place_in(&builder.files, &desc.camera, camera, builder.space)?;
-    builder.finish(desc, camera)
 }
 
 /// Why a transform cannot place anything.

@@ -11,50 +11,41 @@ use crate::error::Result;
 use crate::film::Crop;
 use crate::output::find_output_fault;
 
-/// Checks the numbers of the render settings.
-///
-/// # Errors
-/// [`Error::Scene`](crate::Error::Scene) with the key of the first number that makes no sense.
-pub fn check_settings(desc: &SceneDesc, scene_file: &Path) -> Result<()> {
-    check_settings_from(desc, SceneSource::new(scene_file))
+/// A scene whose render settings are checked, before anything is read that it names.
+#[derive(Debug)]
+pub struct CheckedScene<'a> {
+    pub(super) desc: &'a SceneDesc,
+    pub(super) files: CompileContext,
+    pub(super) camera: Camera,
 }
 
-/// As [`check_settings`], for a scene that was read from a file of any kind; errors name the places in that file.
-///
-/// # Errors
-/// As [`check_settings`].
-pub fn check_settings_from(desc: &SceneDesc, source: SceneSource) -> Result<()> {
-    check(desc, &source.into()).map(drop)
+impl<'a> CheckedScene<'a> {
+    /// Checks the numbers of film, sampler, camera, integrator and outputs of a scene that was read from a file of any
+    /// kind; errors name the places in that file.
+    ///
+    /// # Errors
+    /// [`Error::Scene`](crate::Error::Scene) with the key of the first number that makes no sense.
+    pub fn new(desc: &'a SceneDesc, source: SceneSource) -> Result<Self> {
+        let files = CompileContext::from(source);
+        check_film(&files, &desc.film)?;
+        if desc.sampler.spp == 0 {
+            return Err(files.error("sampler.spp", "must be at least 1"));
+        }
+        let camera = camera::compile(&files, &desc.camera)?;
+        check_integrator(&files, &desc.integrator)?;
+        check_outputs(&files, &desc.outputs)?;
+        Ok(Self { desc, files, camera })
+    }
 }
 
-/// As [`check_settings`], for a film and an integrator alone that `file` holds.
+/// Checks the numbers of a film and an integrator that `file` holds without a scene.
 ///
 /// # Errors
-/// As [`check_settings`].
+/// As [`CheckedScene::new`].
 pub fn check_film_and_integrator(film: &FilmDesc, integrator: &IntegratorDesc, file: &Path) -> Result<()> {
     let files = CompileContext::new(file);
     check_film(&files, film)?;
     check_integrator(&files, integrator)
-}
-
-/// As [`check_settings`], for the scene of `files`; the result is the camera.
-pub(super) fn check(desc: &SceneDesc, files: &CompileContext) -> Result<Camera> {
-    check_film(files, &desc.film)?;
-    if desc.sampler.spp == 0 {
-        return Err(files.error("sampler.spp", "must be at least 1"));
-    }
-    let camera = camera::compile(files, &desc.camera)?;
-    check_integrator(files, &desc.integrator)?;
-    let mut written = HashMap::new();
-    for (i, output) in desc.outputs.iter().enumerate() {
-        let path = format!("outputs[{i}]");
-        check_output(files, &path, output)?;
-        if let Some(first) = written.insert(output.file.as_str(), i) {
-            return Err(files
-                .error(&format!("{path}.file"), format!("\"{}\" is the file of outputs[{first}] too", output.file)));
-        }
-    }
-    Ok(camera)
 }
 
 fn check_film(files: &CompileContext, film: &FilmDesc) -> Result<()> {
@@ -121,6 +112,19 @@ fn check_integrator(files: &CompileContext, integrator: &IntegratorDesc) -> Resu
             files.positive("integrator.distance", f64::from(distance))?;
         }
         _ => {}
+    }
+    Ok(())
+}
+
+fn check_outputs(files: &CompileContext, outputs: &[OutputDesc]) -> Result<()> {
+    let mut written = HashMap::new();
+    for (i, output) in outputs.iter().enumerate() {
+        let path = format!("outputs[{i}]");
+        check_output(files, &path, output)?;
+        if let Some(first) = written.insert(output.file.as_str(), i) {
+            return Err(files
+                .error(&format!("{path}.file"), format!("\"{}\" is the file of outputs[{first}] too", output.file)));
+        }
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! Scenes to files: our own format, with its meshes and images beside it.
+//! Scenes to files: the native format, with its meshes and images beside it.
 
 mod files;
 mod json;
@@ -24,11 +24,11 @@ pub enum Originals {
     Link,
 }
 
-/// Writes a scene that was read from `source` as `target`, a file of our format. Meshes and images without files, and
-/// with [`Originals::Copy`] all others, come into the folder `NAME_files` beside it. The scene itself is written last,
-/// so that it never names what is not there. The result is the number of files beside the scene. Files that are not
-/// there and that the world does not use keep their names, with a warning. `uses` are files of the caller, which are
-/// not overwritten either.
+/// Writes a scene that was read from `source` as `target`, a file of the native format. Meshes and images without
+/// files, and with [`Originals::Copy`] all others, come into the folder `NAME_files` beside it. The scene itself is
+/// written last, so that it never names what is not there. The result is the number of files beside the scene. Files
+/// that are not there and that the world does not use keep their names, with a warning. `uses` are files of the caller,
+/// which are not overwritten either.
 ///
 /// # Errors
 /// [`Error::Usage`] if a file would be overwritten that is read, before any is written, [`Error::Missing`] if a file

@@ -47,7 +47,7 @@ const fn triple(n: f32) -> Option<[f32; 3]> {
 #[test]
 fn layers_of_other_programs_are_recognised() {
     let auto = FileOptions::default();
-    let ours = one(&[
+    let steradian = one(&[
         layer!("", 1.0),
         layer!("albedo.", 2.0),
         layer!("N.", xyz, 3.0),
@@ -55,7 +55,7 @@ fn layers_of_other_programs_are_recognised() {
         layer!("feature_normal.", xyz, 5.0),
     ]
     .concat());
-    assert_eq!(found(&ours, &auto).unwrap(), [triple(1.0), triple(4.0), triple(5.0)]);
+    assert_eq!(found(&steradian, &auto).unwrap(), [triple(1.0), triple(4.0), triple(5.0)]);
     let pbrt = one(&[
         layer!("", 1.0),
         layer!("Albedo.", 2.0),

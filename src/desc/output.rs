@@ -81,91 +81,74 @@ impl OutputDesc {
 
 /// A layer of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum LayerKind {
     /// The picture: radiance, premultiplied by coverage, and coverage. It is always there, so scenes do not name it.
     #[serde(skip)]
     Color,
     /// Depth along the view axis (not ray length), or the distance from an environment camera, in world units; 1e10
     /// where nothing was hit.
+    #[serde(rename = "Z")]
     Z,
     /// Shading normal in world space; zero where nothing was hit.
+    #[serde(rename = "N")]
     N,
     /// Geometric normal in world space; zero where nothing was hit.
+    #[serde(rename = "Ng")]
     Ng,
     /// Position in world space; zero where nothing was hit.
+    #[serde(rename = "P")]
     P,
     /// Surface parameters; zero where nothing was hit.
-    #[serde(rename = "uv")]
     Uv,
     /// How far the surface moves in the picture from when the shutter opens to when it closes, in pixels to the right
     /// and down.
-    #[serde(rename = "motion")]
     Motion,
     /// Fraction of light scattered by the first surface.
-    #[serde(rename = "albedo")]
     Albedo,
     /// Light scattered once, by diffuse reflection. This and the seven that follow sum to the picture.
-    #[serde(rename = "diffuse_direct")]
     DiffuseDirect,
     /// Light scattered more than once, the last time before the camera by diffuse reflection.
-    #[serde(rename = "diffuse_indirect")]
     DiffuseIndirect,
     /// Light scattered once, by specular reflection.
-    #[serde(rename = "specular_direct")]
     SpecularDirect,
     /// Light scattered more than once, the last time before the camera by specular reflection.
-    #[serde(rename = "specular_indirect")]
     SpecularIndirect,
     /// Light scattered once, through a surface.
-    #[serde(rename = "transmission_direct")]
     TransmissionDirect,
     /// Light scattered more than once, the last time before the camera through a surface.
-    #[serde(rename = "transmission_indirect")]
     TransmissionIndirect,
     /// Light given off by the surface that is seen.
-    #[serde(rename = "emission")]
     Emission,
     /// Light from infinity that is seen directly.
-    #[serde(rename = "background")]
     Background,
     /// A layer `light_NAME` for each group of lights and `light_default` for lights in no group; they sum to the
     /// picture.
-    #[serde(rename = "light_groups")]
     LightGroups,
     /// Variance of the picture's red, green and blue, that is, their expected squared error, as far as the samples show
     /// it.
-    #[serde(rename = "variance")]
     Variance,
     /// Number of samples.
-    #[serde(rename = "samples")]
     Samples,
     /// Fraction of light scattered by the first surface that is no mirror and no clear glass: the albedo feature for
     /// denoisers.
-    #[serde(rename = "feature_albedo")]
     FeatureAlbedo,
     /// Mean shading normal of that surface in world space: the normal feature for denoisers.
-    #[serde(rename = "feature_normal")]
     FeatureNormal,
     /// The picture before it was denoised, which denoisers add.
     #[serde(skip)]
     Noisy,
     /// A number for the object that covers most of the pixel, 0 for none.
-    #[serde(rename = "object_id")]
     ObjectId,
     /// A number for the material that covers most of the pixel, 0 for none.
-    #[serde(rename = "material_id")]
     MaterialId,
     /// A number for the instance that covers most of the pixel, 0 for none.
-    #[serde(rename = "instance_id")]
     InstanceId,
     /// Cryptomatte of objects: mattes by name.
-    #[serde(rename = "crypto_object")]
     CryptoObject,
     /// Cryptomatte of materials.
-    #[serde(rename = "crypto_material")]
     CryptoMaterial,
     /// Cryptomatte of assets, which are groups of objects.
-    #[serde(rename = "crypto_asset")]
     CryptoAsset,
 }
 

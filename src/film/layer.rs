@@ -414,6 +414,10 @@ mod tests {
         for (i, info) in LayerInfo::ALL.iter().enumerate() {
             assert_eq!(info.kind as usize, i);
             assert_eq!(LayerInfo::of(info.kind).name, info.name);
+            // Scenes do not name the others.
+            if !matches!(info.source, LayerSource::Color | LayerSource::Denoiser) {
+                assert_eq!(serde_json::to_value(info.kind).unwrap(), info.name);
+            }
         }
     }
 

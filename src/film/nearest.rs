@@ -39,8 +39,8 @@ impl Nearest {
         for pixel in 0..other.depths.len() {
             if !other.depths[pixel].is_nan() {
                 let values = &other.values[pixel * self.channels..(pixel + 1) * self.channels];
-                if let Some(ours) = self.nearer(pixel, other.depths[pixel], other.samples[pixel]) {
-                    ours.copy_from_slice(values);
+                if let Some(kept) = self.nearer(pixel, other.depths[pixel], other.samples[pixel]) {
+                    kept.copy_from_slice(values);
                 }
             }
         }

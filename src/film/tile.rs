@@ -9,7 +9,7 @@ use super::sum::SumPlane;
 use super::{CoverageCounts, Crop, LayerKind, Layout, LightAovSample, PixelSample, Sample, SampleBatch, Taps};
 use crate::color::Rgb;
 
-/// How many dropped samples a tile remembers; it counts all of them.
+/// How many dropped samples a tile keeps; it counts all of them.
 pub(super) const DROPPED_KEPT: usize = 16;
 
 /// A sample that was dropped because it was not finite; it can be replayed.
@@ -365,16 +365,16 @@ impl FilmTile {
         self.weighed.resize(self.samples.len(), InverseVarianceSums::default());
         for (pixel, weighed) in self.weighed.iter_mut().enumerate() {
             let count = f64::from(other.samples[pixel]) * factor;
-            let (ours, theirs) = (weighed.count, count);
+            let (before, added) = (weighed.count, count);
             weighed.count += count;
             if weighed.count > 0.0 {
                 // Where a pixel's variance is not known, its samples are taken to be as good as the others.
                 let known = other.group_statistics(pixel).map(|(_, variance)| variance);
                 for k in 0..3 {
                     let own = weighed.variance[k];
-                    let other = known.map_or(own * ours / theirs.max(f64::MIN_POSITIVE), |variance| variance[k]);
+                    let other = known.map_or(own * before / added.max(f64::MIN_POSITIVE), |variance| variance[k]);
                     weighed.variance[k] =
-                        (ours * ours * own + theirs * theirs * other) / (weighed.count * weighed.count);
+                        (before * before * own + added * added * other) / (weighed.count * weighed.count);
                 }
             }
         }

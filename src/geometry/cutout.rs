@@ -68,7 +68,7 @@ fn side(shape: &Shape, ray: &Ray, hit: &Hit) -> u32 {
     match shape {
         Shape::Mesh(_) => 0,
         Shape::Analytic(placed) => {
-            placed.interaction_with(Detail::Place, ray, hit).is_some_and(|at| at.n_g.dot(ray.direction) > 0.0).into()
+            placed.interaction_with(Detail::Position, ray, hit).is_some_and(|at| at.n_g.dot(ray.direction) > 0.0).into()
         }
     }
 }

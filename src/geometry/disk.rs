@@ -63,7 +63,7 @@ impl Disk {
     pub fn surface(&self, detail: Detail, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
         let raw = ray.at(hit.t);
         let (x, y) = (raw.x, raw.y);
-        if detail == Detail::Place {
+        if detail == Detail::Position {
             return LocalSurface { p: dvec3(x, y, 0.0), n: DVec3::Z, pdf_area: 1.0 / self.area, ..LocalSurface::ZERO };
         }
         let width = self.radius - self.inner_radius;

@@ -142,7 +142,7 @@ impl Frustum {
         let spread = self.top_radius - self.radius;
         let p = (toward * (self.radius + spread * v)).extend(z);
         let (n, pdf_area) = (self.normal(toward.x, toward.y), 1.0 / self.area);
-        if detail == Detail::Place {
+        if detail == Detail::Position {
             return LocalSurface { p, n, pdf_area, ..LocalSurface::ZERO };
         }
         LocalSurface {

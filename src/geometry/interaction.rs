@@ -41,7 +41,7 @@ pub struct SurfaceInteraction {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Detail {
     /// All but the parametrisation: `uv` and `dp_du` may be zero.
-    Place,
+    Position,
     /// Everything.
     Full,
 }

@@ -136,7 +136,7 @@ impl Mesh {
 
     /// Whether a triangle that was found in `f32` to be hit lies ahead of the ray.
     pub fn confirms_hit(&self, prim: PrimId, ray: &Ray) -> bool {
-        self.triangle_points_at(prim, ray.time).place(ray.origin, ray.direction).t > 0.0
+        self.triangle_points_at(prim, ray.time).intersect_plane(ray.origin, ray.direction).t > 0.0
     }
 
     /// Whether vertices move.
@@ -317,11 +317,11 @@ impl Mesh {
     ) -> Option<(SurfaceInteraction, Vec3)> {
         let points = self.triangle_points_at(hit.prim, ray.time);
 
-        let place = points.place(ray.origin, ray.direction);
-        if !place.is_valid() {
+        let plane_hit = points.intersect_plane(ray.origin, ray.direction);
+        if !plane_hit.is_valid() {
             return None;
         }
-        let (p, n_g, mut error) = (place.p, place.n_g, place.error);
+        let (p, n_g, mut error) = (plane_hit.p, plane_hit.n_g, plane_hit.error);
         if self.is_deforming() {
             // Moving a corner to its place takes three roundings.
             let size = points.a.abs().max(points.b.abs()).max(points.c.abs());
@@ -336,7 +336,7 @@ impl Mesh {
         };
         let at = SurfaceInteraction {
             p,
-            t: place.t as f32,
+            t: plane_hit.t as f32,
             error,
             n_g,
             n_s,

@@ -17,7 +17,8 @@ impl Mesh {
 }
 
 impl Geometry {
-    /// Surface parameters of a point of which only the [place](super::Detail::Place) is known; `hit` is what led to it.
+    /// Surface parameters of a point of which only the [position](super::Detail::Position) is known; `hit` is what led
+    /// to it.
     pub fn uv(&self, at: &SurfaceInteraction, hit: Option<&Hit>) -> Vec2 {
         let Shape::Mesh(mesh) = self.shape(at.shape) else { return at.uv };
         // By a rounding artefact, the ray meets another triangle than that of the hit.

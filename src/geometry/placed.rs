@@ -108,7 +108,7 @@ impl Analytic {
         self.surface_with(Detail::Full, ray, hit)
     }
 
-    /// [`surface`](Self::surface), where [`Detail::Place`] may leave parameters and derivatives zero.
+    /// [`surface`](Self::surface), where [`Detail::Position`] may leave parameters and derivatives zero.
     #[inline]
     pub fn surface_with(&self, detail: Detail, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
         match self {
@@ -370,7 +370,7 @@ impl TransformedShape {
     pub fn pdf_area(&self, ray: &Ray) -> Option<f64> {
         let centered = self.centered_ray(ray);
         let hit = self.shape.intersect(&centered.ray)?;
-        let surface = self.shape.surface_with(Detail::Place, &centered.ray, &hit);
+        let surface = self.shape.surface_with(Detail::Position, &centered.ray, &hit);
         Some(self.place(surface.p, surface.n, surface.pdf_area).pdf_area)
     }
 

@@ -88,7 +88,7 @@ impl Quad {
         let q = ray.origin - self.origin + ray.direction * hit.t;
         let (u, v) = (q.dot(self.dual_u).clamp(0.0, 1.0), q.dot(self.dual_v).clamp(0.0, 1.0));
         let p = self.point(u, v);
-        if detail == Detail::Place {
+        if detail == Detail::Position {
             return LocalSurface { p, n: self.n, pdf_area: 1.0 / self.area, ..LocalSurface::ZERO };
         }
         let ([u0, v0], [width, height]) = (self.uv_origin, self.uv_size);

@@ -104,7 +104,7 @@ impl Sphere {
         let raw = ray.at(hit.t);
         let n = raw / raw.length();
         let p = n * self.radius;
-        if detail == Detail::Place {
+        if detail == Detail::Position {
             return LocalSurface { p, n, pdf_area: 1.0 / self.area, ..LocalSurface::ZERO };
         }
         let rho = (p.x * p.x + p.y * p.y).sqrt();

@@ -76,7 +76,7 @@ impl TrianglePoints {
 
     /// Where a ray meets the plane of the triangle, in `f64`.
     #[inline(always)]
-    pub fn place(&self, origin: Vec3, direction: Vec3) -> TriangleIntersection {
+    pub fn intersect_plane(&self, origin: Vec3, direction: Vec3) -> TriangleIntersection {
         let cross = self.cross();
         let t = cross.dot(self.a.as_dvec3() - origin.as_dvec3()) / cross.dot(direction.as_dvec3());
         let p = origin.as_dvec3() + direction.as_dvec3() * t;

@@ -134,7 +134,7 @@ pub struct DirectionDistribution {
 }
 
 impl DirectionDistribution {
-    /// Of the cells of a quadtree along the curve, at most [`MAX_CELLS`]; `None` without light.
+    /// Of the cells of a quadtree along the curve, at most `MAX_CELLS`; `None` without light.
     pub fn new(cells: &[DirectionCell]) -> Option<Self> {
         let total: f64 = cells.iter().map(|cell| cell.light).sum();
         if !(total > 0.0) {

@@ -26,8 +26,11 @@ use crate::math::{Aabb, Vec3};
 /// Records of a leaf beyond which it is divided, after one sample per pixel; after `n` it is `sqrt(n)` times as many.
 const RECORDS_TO_DIVIDE: f64 = 4000.0;
 
-/// Leaves at most.
+/// Leaves of all trees over space together at most.
 const MAX_LEAVES: usize = 1 << 13;
+
+/// Their nodes at most: each division makes two nodes of a leaf.
+const MAX_SPATIAL_NODES: usize = 2 * MAX_LEAVES - ROOTS;
 
 /// Nodes of all distributions together at most. One takes 80 bytes, with its part of the records: 80 MiB, and twice as
 /// much while they are refined.
@@ -323,14 +326,10 @@ impl Guide {
         let (starts, learned, leaves) = (Vec::new(), Vec::new(), Vec::new());
         let mut next = Self { nodes: self.nodes.clone(), starts, learned, leaves, ..*self };
         let depths = self.depths();
-        let mut free = MAX_LEAVES.saturating_sub(self.leaves.len());
         let mut plans = Vec::new();
         for (index, leaf) in self.nodes.iter().enumerate().filter_map(|(index, node)| Some((index, node.leaf()?))) {
             let leaf = &self.leaves[leaf];
-            plans.push((
-                leaf,
-                next.divide(index, depths[index], leaf.count.load(Ordering::Relaxed), most_records, &mut free),
-            ));
+            plans.push((leaf, next.divide(index, depths[index], leaf.count.load(Ordering::Relaxed), most_records)));
         }
         let leaves: usize = plans.iter().map(|(_, parts)| parts.len()).sum();
         let most_nodes = (MAX_NODES / leaves.max(1)).min(MAX_NODES_OF_LEAF);
@@ -356,16 +355,15 @@ impl Guide {
     }
 
     /// Divides a leaf with `count` records until its parts have few enough; returns the nodes of the parts.
-    fn divide(&mut self, index: usize, depth: u32, count: u64, most: u64, free: &mut usize) -> Vec<usize> {
-        if count <= most || depth >= MAX_DEPTH || *free == 0 {
+    fn divide(&mut self, index: usize, depth: u32, count: u64, most: u64) -> Vec<usize> {
+        if count <= most || depth >= MAX_DEPTH || self.nodes.len() >= MAX_SPATIAL_NODES {
             return vec![index];
         }
-        *free -= 1;
         let first = self.nodes.len();
         self.nodes.extend([Node(IS_LEAF); 2]);
         self.nodes[index] = Node(first as u32);
-        let mut parts = self.divide(first, depth + 1, count / 2, most, free);
-        parts.extend(self.divide(first + 1, depth + 1, count / 2, most, free));
+        let mut parts = self.divide(first, depth + 1, count / 2, most);
+        parts.extend(self.divide(first + 1, depth + 1, count / 2, most));
         parts
     }
 

@@ -56,7 +56,7 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneDesc> {
     }
 }
 
-/// A scene in our format as its file has it, without any default; `None` if it cannot be read or is no JSON.
+/// A scene in the native format as its file has it, without any default; `None` if it cannot be read or is no JSON.
 pub fn scene_as_written(path: &Path) -> Option<Value> {
     let text = crate::file::read_to_string(path).ok()?;
     serde_json::from_str(&blank_comments(&text).text).ok()

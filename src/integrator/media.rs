@@ -22,13 +22,13 @@ pub(super) struct MediaState {
     pub current: MediumStack,
     /// The colour channel that it follows, once dispersion has parted them.
     pub channel: Option<usize>,
-    /// If it has arrived at a boundary between media: the index of refraction of the inside over that of the outside.
+    /// At a boundary between media: the index of refraction of the inside over that of the outside.
     pub ior: Option<f32>,
 }
 
-/// Where a ray meets something else than media that go on behind a surface.
-pub(super) struct Arrival {
-    /// On the ray, which by then may be another one.
+/// The part of a ray before the first surface that scatters: up to there it passes boundaries within one medium.
+pub(super) struct MediumSegment {
+    /// On the ray, which starts at the last boundary that it has passed.
     pub hit: Option<Hit>,
     /// What is left of light on the way.
     pub transmittance: Rgb,
@@ -103,13 +103,18 @@ impl World<'_> {
         }
     }
 
-    /// What is left of the light along a ray that meets nothing on its way, which lies within `here`.
+    /// What is left of the light along a ray that meets nothing on its way, which lies within the media `current`.
     pub(super) fn transmittance(&self, current: &MediumStack, ray: &Ray) -> Rgb {
         self.scene.media.transmittance(current, (ray.t_max - ray.t_min) * ray.direction.length())
     }
 
     /// Follows `ray`, which has found `hit`, through all surfaces where light passes as if there were none.
-    pub(super) fn arrive(&self, ray: &mut Ray, mut hit: Option<Hit>, state: &mut MediaState) -> Arrival {
+    pub(super) fn trace_through_null_boundaries(
+        &self,
+        ray: &mut Ray,
+        mut hit: Option<Hit>,
+        state: &mut MediaState,
+    ) -> MediumSegment {
         let mut transmittance = Rgb::WHITE;
         let mut passed = 0;
         loop {
@@ -121,7 +126,7 @@ impl World<'_> {
             let (Some(at), Some(boundary), true) =
                 (at, boundary, ior.is_some_and(|ior| ior.is_one()) && passed < MAX_SURFACES)
             else {
-                return Arrival { hit, transmittance, passed, ior };
+                return MediumSegment { hit, transmittance, passed, ior };
             };
             state.current = boundary.sides.beyond(ray.direction.dot(at.n_g) < 0.0);
             *ray = at.spawn(ray.direction);

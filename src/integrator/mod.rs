@@ -27,7 +27,7 @@ use path::PathBuffers;
 pub use path::PathIntegrator;
 pub use regularization::Regularization;
 pub use render_context::RenderContext;
-pub(crate) use shading::{facing_normal, terminator_factor};
+pub(crate) use shading::{adapt_shading_normal, terminator_factor};
 pub use strategy::Strategy;
 pub use surface::SurfaceAovs;
 pub use whitted::Whitted;

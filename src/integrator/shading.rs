@@ -14,7 +14,7 @@ const LEAST_REFLECTION: f32 = 0.01;
 /// System", section 4.3). All are unit, `back` points away from the surface, `n_s` lies in the hemisphere of `n_g`, and
 /// so does the result, which `back` sees from the same side as `n_g`.
 #[inline]
-pub fn facing_normal(back: Vec3, n_s: Vec3, n_g: Vec3) -> Vec3 {
+pub fn adapt_shading_normal(back: Vec3, n_s: Vec3, n_g: Vec3) -> Vec3 {
     if is_consistent(back, n_s, n_g) { n_s } else { adapted_normal(back, n_s, n_g) }
 }
 
@@ -103,7 +103,7 @@ mod tests {
         let n_g = Vec3::Z;
         for n_s in directions(400).filter(|n| n.z > 0.0) {
             for back in directions(2_000) {
-                let n = facing_normal(back, n_s, n_g);
+                let n = adapt_shading_normal(back, n_s, n_g);
                 let reflected = 2.0 * back.dot(n) * n - back;
                 let least = LEAST_REFLECTION.min(0.9 * back.z.abs());
                 assert!((n.length() - 1.0).abs() < 1e-5 && n.z > 0.0, "{back} {n_s} {n}");
@@ -117,14 +117,14 @@ mod tests {
     fn a_normal_is_turned_no_more_than_needed() {
         let (n_g, n_s) = (Vec3::Z, Vec3::new(0.6, 0.0, 0.8));
         for back in [Vec3::Z, Vec3::new(0.6, 0.0, 0.8), Vec3::new(0.0, 0.6, 0.8)] {
-            assert_eq!(facing_normal(back, n_s, n_g), n_s);
-            assert_eq!(facing_normal(-back, n_s, n_g), n_s);
+            assert_eq!(adapt_shading_normal(back, n_s, n_g), n_s);
+            assert_eq!(adapt_shading_normal(-back, n_s, n_g), n_s);
         }
         // Without a jump where turning begins, and where the shading normal turns away.
         let mut last: Option<Vec3> = None;
         for i in 0..10_000 {
             let (sin, cos) = (1.57 * (1.0 - 2.0 * i as f32 / 10_000.0)).sin_cos();
-            let n = facing_normal(Vec3::new(sin, 0.0, cos), n_s, n_g);
+            let n = adapt_shading_normal(Vec3::new(sin, 0.0, cos), n_s, n_g);
             assert!(last.is_none_or(|last| (last - n).length() < 1e-3), "{i} {last:?} {n}");
             last = Some(n);
         }

@@ -25,7 +25,7 @@ pub struct SurfaceAovs {
 
 /// What the layers need of the place of the first surface, which `ray` meets at `at`; `hit` is what the accelerator
 /// found.
-pub(super) fn place_sample(
+pub(super) fn geometry_aovs(
     pass: &PassContext,
     needs: SurfaceAovs,
     at: &SurfaceInteraction,
@@ -63,7 +63,7 @@ pub(super) fn surface_sample<'f>(
     FirstSurface { ray, hit, at }: FirstSurface,
     footprint: impl FnOnce() -> Footprint<'f>,
 ) -> SurfaceSample {
-    let mut sample = place_sample(pass, needs, at, hit);
+    let mut sample = geometry_aovs(pass, needs, at, hit);
     if needs.albedo || needs.features {
         sample.albedo = albedo_at(pass.world, at, ray, footprint);
     }
@@ -94,6 +94,6 @@ pub(super) fn set_features(sample: &mut SurfaceSample, throughput: Rgb, albedo: 
 impl World<'_> {
     /// Surface parameters at the point of a hit.
     fn uv(&self, at: &SurfaceInteraction, hit: Option<&Hit>) -> Vec2 {
-        if self.detail(at.shape) == Detail::Place { self.scene.geometry.uv(at, hit) } else { at.uv }
+        if self.detail(at.shape) == Detail::Position { self.scene.geometry.uv(at, hit) } else { at.uv }
     }
 }

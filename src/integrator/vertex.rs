@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use super::World;
-use super::shading::{facing_normal, terminator_factor, terminator_start};
+use super::shading::{adapt_shading_normal, terminator_factor, terminator_start};
 use crate::bsdf::{Bsdf, BsdfEval};
 use crate::geometry::SurfaceInteraction;
 use crate::light::LightSampleContext;
@@ -61,7 +61,8 @@ impl<'a> Vertex<'a> {
     ) -> Self {
         let back = -ray.direction;
         let cos_geometric = back.dot(at.n_g);
-        let n_s = if world.scene.features.shading_normals { facing_normal(back, at.n_s, at.n_g) } else { at.n_g };
+        let n_s =
+            if world.scene.features.shading_normals { adapt_shading_normal(back, at.n_s, at.n_g) } else { at.n_g };
         let frame = if world.scene.features.anisotropic {
             Frame::from_normal_and_tangent(n_s, at.dp_du)
         } else {

@@ -69,7 +69,7 @@ impl Integrator for Whitted {
                 };
             }
             let mut tally = Tally { light_aovs: &mut out.light_aovs, index: i, rays: counts, sample, light_samples: 0 };
-            let view = View { depth: 1, throughput: segment.transmittance, way: None };
+            let view = View { depth: 1, throughput: segment.transmittance, lobes: None };
             out.pixels[i] = match &segment.end {
                 Some(at) => PixelSample {
                     radiance: self.shade(pass, &segment, at, view, &mut tally) * segment.transmittance,
@@ -77,7 +77,7 @@ impl Integrator for Whitted {
                 },
                 None if self.hide_emitters || !pass.render.shows_background => PixelSample::default(),
                 None => PixelSample {
-                    radiance: segment.escaped(world, View { throughput: Rgb::WHITE, ..view }, &mut tally),
+                    radiance: segment.environment_radiance(world, View { throughput: Rgb::WHITE, ..view }, &mut tally),
                     alpha: pass.render.background_alpha(),
                 },
             };
@@ -93,15 +93,15 @@ struct View {
     /// What is left at the camera of the light that leaves its end.
     throughput: Rgb,
     /// How light left the first surface, if this is behind it.
-    way: Option<LobeWeights>,
+    lobes: Option<LobeWeights>,
 }
 
 impl View {
-    /// The course of light that comes along the segment, after `scatterings` at its end.
-    fn course(self, scatterings: u32, straight: LightEvent) -> LightEvent {
-        match (self.way, self.depth - 1 + scatterings) {
-            (Some(way), 1) => LightEvent::Direct(way),
-            (Some(way), _) => LightEvent::Indirect(way),
+    /// How light came that comes along the segment, after `scatterings` at its end.
+    fn event(self, scatterings: u32, straight: LightEvent) -> LightEvent {
+        match (self.lobes, self.depth - 1 + scatterings) {
+            (Some(lobes), 1) => LightEvent::Direct(lobes),
+            (Some(lobes), _) => LightEvent::Indirect(lobes),
             (None, _) => straight,
         }
     }
@@ -119,13 +119,13 @@ struct Tally<'a> {
 }
 
 impl Tally<'_> {
-    fn sorts(&self) -> bool {
+    fn needs_light_aovs(&self) -> bool {
         self.light_aovs.request().count() > 0
     }
 
     /// Adds light at the camera; that of no light is in the last group.
-    fn add(&mut self, world: &World, light: Rgb, course: LightEvent, source: Option<LightId>) {
-        add_by_scattering(self.light_aovs, self.index, light, course);
+    fn add(&mut self, world: &World, light: Rgb, event: LightEvent, source: Option<LightId>) {
+        add_by_scattering(self.light_aovs, self.index, light, event);
         let last = self.light_aovs.request().light_groups.saturating_sub(1) as usize;
         add_by_group(self.light_aovs, self.index, light, source.map_or(last, |id| group_of(world.scene, id)));
     }
@@ -146,7 +146,7 @@ struct Segment {
 }
 
 impl Segment {
-    /// Traces a ray that starts within the media `here`.
+    /// Traces a ray that starts within the media `current`.
     fn trace(world: &World, mut ray: Ray, cone: Option<RayCone>, current: MediumStack, counts: &mut RayCounts) -> Self {
         let mut media = MediaState { current, ..MediaState::default() };
         let hit = world.accel.intersect(&ray);
@@ -154,12 +154,12 @@ impl Segment {
             return Self { ray, cone, hit, end: world.resolve(&ray, hit), media, transmittance: Rgb::WHITE };
         }
         let start = ray.origin;
-        let arrival = world.arrive(&mut ray, hit, &mut media);
-        counts.indirect += u64::from(arrival.passed);
-        media.ior = arrival.ior.map(|ior| ior.of(None));
+        let segment = world.trace_through_null_boundaries(&mut ray, hit, &mut media);
+        counts.indirect += u64::from(segment.passed);
+        media.ior = segment.ior.map(|ior| ior.of(None));
         let cone = cone.map(|cone| cone.moved((ray.origin - start).length()));
-        let hit = arrival.hit;
-        Self { ray, cone, hit, end: world.resolve(&ray, hit), media, transmittance: arrival.transmittance }
+        let hit = segment.hit;
+        Self { ray, cone, hit, end: world.resolve(&ray, hit), media, transmittance: segment.transmittance }
     }
 
     /// The footprint of the ray on the surface at its end.
@@ -179,12 +179,12 @@ impl Segment {
     }
 
     /// What arrives from infinity.
-    fn escaped(&self, world: &World, view: View, tally: &mut Tally) -> Rgb {
-        if tally.sorts() {
+    fn environment_radiance(&self, world: &World, view: View, tally: &mut Tally) -> Rgb {
+        if tally.needs_light_aovs() {
             for &id in world.scene.lights.at_infinity() {
                 let light = world.scene.lights.get(id).eval_infinite(self.ray.direction, MisCompensation::Off).radiance;
-                let course = view.course(0, LightEvent::Environment);
-                tally.add(world, view.throughput * light * self.transmittance, course, Some(id));
+                let event = view.event(0, LightEvent::Environment);
+                tally.add(world, view.throughput * light * self.transmittance, event, Some(id));
             }
         }
         world.radiance_at_infinity(self.ray.direction) * self.transmittance
@@ -212,9 +212,9 @@ impl Whitted {
     ) -> Rgb {
         let (world, Segment { ray, cone, media, .. }) = (pass.world, segment);
         let mut radiance = world.emitted(at, -ray.direction);
-        if tally.sorts() {
+        if tally.needs_light_aovs() {
             let source = world.scene.surface(at.shape).light(at.prim);
-            tally.add(world, view.throughput * radiance, view.course(0, LightEvent::Emission), source);
+            tally.add(world, view.throughput * radiance, view.event(0, LightEvent::Emission), source);
         }
         if view.depth >= self.max_depth || pass.render.is_cancel_due() {
             return radiance;
@@ -223,16 +223,16 @@ impl Whitted {
         if !vertex.bsdf.flags().is_delta() {
             let ambient = self.ambient * vertex.bsdf.albedo(vertex.wo);
             radiance += ambient;
-            if tally.sorts() {
-                let course = view.course(2, LightEvent::Indirect(LobeWeights::DIFFUSE));
-                tally.add(world, view.throughput * ambient, course, None);
+            if tally.needs_light_aovs() {
+                let event = view.event(2, LightEvent::Indirect(LobeWeights::DIFFUSE));
+                tally.add(world, view.throughput * ambient, event, None);
             }
             for id in (0..world.scene.lights.lights().len()).map(LightId::new) {
                 let Some((light, wi)) = self.direct_light(world, segment, &vertex, id, tally) else { continue };
                 radiance += light;
-                if tally.sorts() {
-                    let way = LobeWeights::between(&vertex.bsdf, vertex.wo, vertex.frame.to_local(wi));
-                    tally.add(world, view.throughput * light, view.course(1, LightEvent::Direct(way)), Some(id));
+                if tally.needs_light_aovs() {
+                    let lobes = LobeWeights::between(&vertex.bsdf, vertex.wo, vertex.frame.to_local(wi));
+                    tally.add(world, view.throughput * light, view.event(1, LightEvent::Direct(lobes)), Some(id));
                 }
             }
         }
@@ -247,15 +247,15 @@ impl Whitted {
             let current = world.media_toward(at, ray.direction, direction, &media.current);
             let next =
                 Segment::trace(world, at.spawn(direction), cone.map(|cone| cone.moved(at.t)), current, tally.rays);
-            let way = view.way.unwrap_or_else(|| LobeWeights::of_sample(&vertex.bsdf, vertex.wo, &lobe));
-            let behind =
-                View { depth: view.depth + 1, throughput: view.throughput * lobe.weight * lobe.pdf, way: Some(way) };
+            let lobes = view.lobes.unwrap_or_else(|| LobeWeights::of_sample(&vertex.bsdf, vertex.wo, &lobe));
+            let throughput = view.throughput * lobe.weight * lobe.pdf;
+            let behind = View { depth: view.depth + 1, throughput, lobes: Some(lobes) };
             let arriving = match &next.end {
                 Some(end) => {
                     let behind = View { throughput: behind.throughput * next.transmittance, ..behind };
                     self.shade(pass, &next, end, behind, tally) * next.transmittance
                 }
-                None => next.escaped(world, behind, tally),
+                None => next.environment_radiance(world, behind, tally),
             };
             radiance += arriving * lobe.weight * lobe.pdf;
         }

@@ -50,7 +50,7 @@ impl<'a> World<'a> {
     /// How much of interactions with a shape is computed.
     #[inline]
     pub(super) fn detail(&self, shape: ShapeId) -> Detail {
-        if self.parametrization[shape.index()] == Parametrization::Unused { Detail::Place } else { Detail::Full }
+        if self.parametrization[shape.index()] == Parametrization::Unused { Detail::Position } else { Detail::Full }
     }
 
     /// The shape if it is a mesh at rest of whose hits nothing but the point, the normals and perhaps uv is needed.

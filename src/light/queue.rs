@@ -6,7 +6,7 @@ use super::{EnvironmentMap, Light, LightSample, LightSampleContext, LightSet, Mi
 use crate::color::Rgb;
 use crate::geometry::{Geometry, SpawnPoint};
 use crate::id::LightId;
-use crate::math::rows::{BATCH, Points, Row, soa};
+use crate::math::rows::{BATCH, DVec3Rows, Row, soa};
 use crate::math::{DVec3, Vec3};
 use crate::sampling::SampleRows;
 use crate::texture::Texture;
@@ -46,7 +46,7 @@ soa! {
 impl LightSampleRows {
     /// Sets the sample of a vertex, whose light was chosen with probability `pmf`.
     #[inline(always)]
-    fn set(&mut self, lane: usize, sample: &LightSample, pmf: f32, target_p: &mut Points) {
+    fn set(&mut self, lane: usize, sample: &LightSample, pmf: f32, target_p: &mut DVec3Rows) {
         self.is_delta[lane] = u32::from(sample.is_delta);
         self.direction.set(lane, sample.wi);
         self.radiance.set(lane, sample.radiance);
@@ -106,7 +106,7 @@ pub struct LightQueries<'a> {
     /// How many vertices there are.
     pub count: usize,
     /// Their points.
-    pub points: &'a Points,
+    pub points: &'a DVec3Rows,
     /// Numbers in `[0, 1)`: the first and the last choose a light, the others a point of it.
     pub u: &'a SampleRows,
 }
@@ -160,7 +160,7 @@ impl LightQueue {
         context: &LightContext,
         queries: &LightQueries,
         samples: &mut LightSampleRows,
-        target_p: &mut Points,
+        target_p: &mut DVec3Rows,
     ) {
         let Self { pmfs, area, emitters, sky, alone } = self;
         area.sample(queries, pmfs, samples, target_p);

@@ -156,7 +156,7 @@ pub enum CoatInput {
     /// The same everywhere.
     Constant(Coat),
     /// From textures.
-    Varying {
+    Textured {
         /// Index of refraction over that of the outside.
         ior: RangedInput,
         /// Roughness.
@@ -171,7 +171,7 @@ impl CoatInput {
             RangedInput::Constant(ior) if alpha.is_constant() => {
                 Self::Constant(Coat::new(ior, alpha.at(&[], &Footprint::point(Vec2::ZERO))))
             }
-            ior => Self::Varying { ior, alpha },
+            ior => Self::Textured { ior, alpha },
         }
     }
 
@@ -180,7 +180,9 @@ impl CoatInput {
     pub(super) fn at(&self, textures: &[Texture], footprint: &Footprint) -> Coat {
         match self {
             Self::Constant(coat) => *coat,
-            Self::Varying { ior, alpha } => Coat::looked_up(ior.at(textures, footprint), alpha.at(textures, footprint)),
+            Self::Textured { ior, alpha } => {
+                Coat::looked_up(ior.at(textures, footprint), alpha.at(textures, footprint))
+            }
         }
     }
 
@@ -192,14 +194,14 @@ impl CoatInput {
     pub(super) fn textures(&self) -> Vec<TextureId> {
         match self {
             Self::Constant(_) => Vec::new(),
-            Self::Varying { ior, alpha } => ior.texture().into_iter().chain(alpha.textures()).collect(),
+            Self::Textured { ior, alpha } => ior.texture().into_iter().chain(alpha.textures()).collect(),
         }
     }
 
     pub(super) fn flags(&self) -> BsdfFlags {
         match self {
             Self::Constant(coat) => coat.flags(),
-            Self::Varying { alpha, .. } => alpha.flags() | BsdfFlags::REFLECTION,
+            Self::Textured { alpha, .. } => alpha.flags() | BsdfFlags::REFLECTION,
         }
     }
 }

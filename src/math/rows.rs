@@ -52,9 +52,9 @@ pub fn pair(rows: &[Row; 2], i: usize) -> [f32; 2] {
 
 /// A vector of the plane per lane, by component.
 #[derive(Clone, Debug)]
-pub struct PlaneVectors(pub [Row; 2]);
+pub struct Vec2Rows(pub [Row; 2]);
 
-impl PlaneVectors {
+impl Vec2Rows {
     /// The vector of a lane.
     #[inline(always)]
     pub fn get(&self, i: usize) -> Vec2 {
@@ -69,25 +69,25 @@ impl PlaneVectors {
 }
 
 impl Element for Vec2 {
-    type Rows = PlaneVectors;
-    const ZERO: PlaneVectors = PlaneVectors([[0.0; BATCH]; 2]);
+    type Rows = Vec2Rows;
+    const ZERO: Vec2Rows = Vec2Rows([[0.0; BATCH]; 2]);
 
     #[inline(always)]
-    fn get(rows: &PlaneVectors, i: usize) -> Self {
+    fn get(rows: &Vec2Rows, i: usize) -> Self {
         rows.get(i)
     }
 
     #[inline(always)]
-    fn set(rows: &mut PlaneVectors, i: usize, value: Self) {
+    fn set(rows: &mut Vec2Rows, i: usize, value: Self) {
         rows.set(i, value);
     }
 }
 
 /// A vector per lane, by component.
 #[derive(Clone, Debug)]
-pub struct Vectors(pub [Row; 3]);
+pub struct Vec3Rows(pub [Row; 3]);
 
-impl Vectors {
+impl Vec3Rows {
     /// All zero.
     pub const ZERO: Self = Self([[0.0; BATCH]; 3]);
 
@@ -104,32 +104,32 @@ impl Vectors {
     }
 }
 
-impl Default for Vectors {
+impl Default for Vec3Rows {
     fn default() -> Self {
         Self::ZERO
     }
 }
 
 impl Element for Vec3 {
-    type Rows = Vectors;
-    const ZERO: Vectors = Vectors::ZERO;
+    type Rows = Vec3Rows;
+    const ZERO: Vec3Rows = Vec3Rows::ZERO;
 
     #[inline(always)]
-    fn get(rows: &Vectors, i: usize) -> Self {
+    fn get(rows: &Vec3Rows, i: usize) -> Self {
         rows.get(i)
     }
 
     #[inline(always)]
-    fn set(rows: &mut Vectors, i: usize, value: Self) {
+    fn set(rows: &mut Vec3Rows, i: usize, value: Self) {
         rows.set(i, value);
     }
 }
 
 /// A point per lane, by coordinate.
 #[derive(Clone, Debug)]
-pub struct Points(pub [Row<f64>; 3]);
+pub struct DVec3Rows(pub [Row<f64>; 3]);
 
-impl Points {
+impl DVec3Rows {
     /// All zero.
     pub const ZERO: Self = Self([[0.0; BATCH]; 3]);
 
@@ -147,16 +147,16 @@ impl Points {
 }
 
 impl Element for DVec3 {
-    type Rows = Points;
-    const ZERO: Points = Points::ZERO;
+    type Rows = DVec3Rows;
+    const ZERO: DVec3Rows = DVec3Rows::ZERO;
 
     #[inline(always)]
-    fn get(rows: &Points, i: usize) -> Self {
+    fn get(rows: &DVec3Rows, i: usize) -> Self {
         rows.get(i)
     }
 
     #[inline(always)]
-    fn set(rows: &mut Points, i: usize, value: Self) {
+    fn set(rows: &mut DVec3Rows, i: usize, value: Self) {
         rows.set(i, value);
     }
 }

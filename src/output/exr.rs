@@ -1,12 +1,12 @@
 //! OpenEXR: the colour as R, G, B, A and every other layer as `layer.channel`, in one part or several.
 
 mod blocks;
+mod channels;
 mod coverage;
 mod header_order;
 mod metadata;
 mod names;
 mod plan;
-mod plane;
 mod read;
 mod write;
 

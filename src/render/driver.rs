@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::planner::{Pass, PassSize};
 use super::tile_renderer::{TileRenderer, TileWorkspace};
-use super::{Checkpoints, Progress, RenderState, Settings, Stats, check_kept};
+use super::{Checkpoints, Progress, RenderState, Settings, Stats, check_resumable};
 use crate::accel::Accelerator;
 use crate::error::{Error, Result};
 use crate::film::FilmTile;
@@ -46,13 +46,13 @@ impl RenderSession<'_> {
     /// has the same bits however often that happens.
     ///
     /// # Errors
-    /// As [`render`](super::render()); [`Error::Usage`] as [`check_kept`] has it.
+    /// As [`render`](super::render()); [`Error::Usage`] as [`check_resumable`] has it.
     pub fn render(
         &self,
         mut state: RenderState,
         checkpoints: Option<&mut Checkpoints>,
     ) -> Result<(RenderState, Stats)> {
-        check_kept(self.settings, state.shard)?;
+        check_resumable(self.settings, state.shard)?;
         let cancel = Cancel::new(self.stop, self.settings.time_limit);
         let mut renderer = TileRenderer::new(self.scene, self.accel, self.settings);
         renderer.context = renderer.context.with_cancel(&cancel);

@@ -22,7 +22,7 @@ pub use overrides::Overrides;
 pub use progress::{Progress, Silent};
 pub use provenance::{RenderProvenance, SequenceFrame};
 pub use settings::{DEFAULT_EXTENSIONS, Settings, threads};
-pub use state::{Checkpoints, Header, Merged, RenderState, Shard, StateFile, check_kept, merge};
+pub use state::{Checkpoints, Header, Merged, RenderState, Shard, StateFile, check_resumable, merge};
 pub use trained_guide::TrainedGuide;
 
 use std::sync::atomic::AtomicBool;

@@ -64,7 +64,7 @@ pub struct TextureImage {
     ranges: [[f32; 2]; 2],
     /// Linear values of the codes of an 8-bit image, in proportion and by the sRGB curve.
     tables: &'static [[f32; 256]; 2],
-    /// Smaller versions by [`Decoding`], made when they are first asked for.
+    /// Smaller versions by [`Decoding`], made when they are first used.
     pyramids: [OnceLock<Box<Pyramid>>; 2],
 }
 

@@ -132,7 +132,7 @@ impl Filter {
         unsafe { &*self.geometry }
     }
 
-    /// Our id of Embree's instance number: instances follow the shapes.
+    /// The [`InstanceId`] of Embree's instance number: instances follow the shapes.
     fn instance(geometry: &Geometry, number: u32) -> InstanceId {
         if number == INVALID { Hit::NO_INSTANCE } else { InstanceId(number - geometry.shapes.len() as u32) }
     }

@@ -8,11 +8,13 @@ mod callbacks;
 mod device;
 mod gate;
 mod packet;
+#[cfg(feature = "bench")]
 mod replay;
 mod scene;
 mod sys;
 
 pub use device::EmbreeInfo;
+#[cfg(feature = "bench")]
 pub use replay::EmbreeReplay;
 
 use std::ffi::c_char;
@@ -141,8 +143,8 @@ impl<'g> EmbreeAccel<'g> {
         memory.bytes()
     }
 
-    /// The hit in our ids: in the world a geometry's number is its shape's id, and instances follow the shapes; in an
-    /// object it is the shape's place there.
+    /// The hit in ids of [`Geometry`]: in the world a geometry's number is its shape's id, and instances follow the
+    /// shapes; in an object it is the shape's place there.
     #[inline(always)]
     fn hit(&self, raw: StHit) -> Hit {
         let (shape, instance) = if raw.instance == INVALID {
@@ -161,7 +163,7 @@ impl<'g> EmbreeAccel<'g> {
         (object.shapes[geometry as usize], instance)
     }
 
-    /// Replaces Embree's numbers by our ids where a hit is within an instance.
+    /// Replaces Embree's numbers by ids of [`Geometry`] where a hit is within an instance.
     fn resolve_instances(&self, hits: &mut HitRows, count: usize) {
         for lane in 0..count {
             if hits.shape[lane] != HitRows::MISS && hits.instance[lane] != INVALID {

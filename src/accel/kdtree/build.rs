@@ -50,6 +50,13 @@ struct Plane {
     cost: f32,
 }
 
+/// A cell cut in two.
+struct Halves {
+    plane: Plane,
+    lower: Cell,
+    upper: Cell,
+}
+
 /// A subtree with links relative to itself.
 struct Subtree {
     nodes: Vec<Node>,
@@ -75,7 +82,7 @@ struct Builder<'a> {
 
 impl Builder<'_> {
     fn build(&self, cell: Cell) -> Subtree {
-        let Some((plane, lower, upper)) = self.split(&cell) else {
+        let Some(Halves { plane, lower, upper }) = self.split(&cell) else {
             let items: Vec<_> = cell.parts.iter().map(|part| self.items.list[part.item as usize]).collect();
             return Subtree { nodes: vec![Node::leaf(0, items.len())], items };
         };
@@ -90,7 +97,7 @@ impl Builder<'_> {
     }
 
     /// The cell's halves, if that pays.
-    fn split(&self, cell: &Cell) -> Option<(Plane, Cell, Cell)> {
+    fn split(&self, cell: &Cell) -> Option<Halves> {
         let count = cell.parts.len();
         if cell.depth >= self.max_depth || count <= if self.median { 4 } else { 1 } {
             return None;
@@ -133,7 +140,7 @@ impl Builder<'_> {
             let budget = cell.budget * parts.len() as f64 / total.max(1) as f64;
             Cell { bounds, parts, depth: cell.depth + 1, bad_splits, budget }
         };
-        Some((plane, half(below, lower), half(above, upper)))
+        Some(Halves { plane, lower: half(below, lower), upper: half(above, upper) })
     }
 }
 

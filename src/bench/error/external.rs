@@ -87,7 +87,7 @@ struct PrintedStatistics {
 }
 
 impl PrintedStatistics {
-    /// In the whole text or in one of its lines: our own statistics, or an object with `runs`, whose last has
+    /// In the whole text or in one of its lines: Steradian's statistics, or an object with `runs`, whose last has
     /// `render_s`.
     fn in_text(text: &str) -> Self {
         let objects = std::iter::once(text).chain(text.lines().filter(|line| line.starts_with('{')));

@@ -121,7 +121,7 @@ pub fn measure(comparison: FrameBenchmark, kind: Kind) -> Result<Vec<Found>> {
         let subject = build(&scene.geometry)?;
         subjects.push((subject, start.elapsed().as_secs_f64() * 1e3));
     }
-    // Our BVH answers as the linear loop does, which would take too long for full frames.
+    // The BVH answers as the linear loop does, which would take too long for full frames.
     let oracle = accel::build(AccelKind::Bvh(accel::BvhOptions::default()), &scene.geometry, 1)?;
     let pictures = [frame(sizes[0], &*oracle)?.1, frame(sizes[1], &*oracle)?.1];
     let mut times = vec![(Vec::new(), Vec::new()); entries.len()];

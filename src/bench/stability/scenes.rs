@@ -20,7 +20,7 @@ pub fn build(kind: AccelKind, geometry: &Geometry) -> Box<dyn Accelerator + '_> 
     accel::build(kind, geometry, 1).expect(BUILDS)
 }
 
-/// Our own accelerators with their names.
+/// Accelerators of this crate with their names.
 pub fn own(geometry: &Geometry) -> Vec<(&'static str, Box<dyn Accelerator + '_>)> {
     ["bvh", "bvh:binary", "kdtree", "kdtree:median", "octree"]
         .map(|name| (name, build(name.parse().expect(BUILDS), geometry)))
@@ -45,9 +45,9 @@ pub fn distance_error(name: &str) -> f32 {
 }
 
 /// An accelerator whose answers to single rays are those to batches of one.
-pub struct OfBatches<'g>(pub Box<dyn Accelerator + 'g>);
+pub struct BatchesOfOne<'g>(pub Box<dyn Accelerator + 'g>);
 
-impl Accelerator for OfBatches<'_> {
+impl Accelerator for BatchesOfOne<'_> {
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let mut hits = [None];
         self.0.intersect_batch(&[*ray], &mut hits, Coherence::Incoherent);
@@ -79,7 +79,7 @@ impl Accelerator for OfBatches<'_> {
 
 /// Packets of rays, also for single ones.
 pub fn packets(geometry: &Geometry) -> Box<dyn Accelerator + '_> {
-    Box::new(OfBatches(build(AccelKind::Packets, geometry)))
+    Box::new(BatchesOfOne(build(AccelKind::Packets, geometry)))
 }
 
 /// What every entry point answers to these rays: single, in coherent batches and in incoherent ones.

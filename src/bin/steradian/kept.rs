@@ -59,7 +59,7 @@ impl<'a> Resumable<'a> {
             return Ok(None);
         }
         let shard = arguments.shard.unwrap_or_default();
-        render::check_kept(settings, shard)?;
+        render::check_resumable(settings, shard)?;
         if let Some(path) = checkpoint
             && path.exists()
             && !arguments.resume

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use steradian::Result;
 use steradian::accel::{self, Accelerator};
+use steradian::compile::CheckedScene;
 use steradian::denoise::Denoiser;
 use steradian::farm::check_single_name;
 use steradian::film::LayerSet;
@@ -14,7 +16,6 @@ use steradian::render::{
     Stats, TrainedGuide,
 };
 use steradian::scene::Scene;
-use steradian::{Result, compile};
 
 use crate::args::RenderArgs;
 use crate::denoise;
@@ -28,11 +29,12 @@ use crate::{files, text};
 
 /// Renders a picture and writes its outputs; the result is the exit code. `start` is when the scene's reading began.
 pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Instant) -> Result<u8> {
+    let checked = CheckedScene::new(&shot.imported.desc, shot.imported.source(&shot.scene))?;
     let Some(mut plan) = Plan::new(arguments, &shot, session)? else {
         session.reporter.complete_frame();
         return Ok(0);
     };
-    let mut scene = compile::compile_from(&shot.imported.desc, shot.imported.source(&shot.scene))?;
+    let mut scene = checked.compile()?;
     if !plan.settings.depth_of_field {
         scene.camera.remove_lens();
     }
@@ -95,7 +97,6 @@ impl<'a> Plan<'a> {
     /// Checks all that can be checked before the scene is made; `None` if the frame is there already.
     fn new(arguments: &'a RenderArgs, shot: &Shot, session: &Session) -> Result<Option<Self>> {
         let json = arguments.json.as_deref().map(|path| shot.file(path));
-        compile::check_settings_from(&shot.imported.desc, shot.imported.source(&shot.scene))?;
         let mut overrides = arguments.overrides(default_outputs(&arguments.scene));
         let shard_name = kept::take_shard_name(&arguments.state, &arguments.scene, &mut overrides)?;
         let shard_file = shard_name.as_deref().map(|name| shot.file_of(name));

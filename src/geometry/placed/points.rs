@@ -118,7 +118,7 @@ macro_rules! lane_shapes {
     )*};
 }
 
-lane_shapes!(Sphere: Detail::Place, Quad: Detail::Full, Disk: Detail::Place, Frustum: Detail::Place);
+lane_shapes!(Sphere: Detail::Position, Quad: Detail::Full, Disk: Detail::Position, Frustum: Detail::Position);
 
 #[inline(always)]
 fn resolve_on<S: LaneShape>(

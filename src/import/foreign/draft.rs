@@ -1,4 +1,4 @@
-//! A scene of our own format while a reader fills it.
+//! A scene of the native format while a reader fills it.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! Scenes of other renderers, read into our own description.
+//! Scenes of other renderers, read into a [`SceneDesc`].
 
 mod draft;
 mod gltf;
@@ -32,18 +32,18 @@ pub struct ImportOptions {
     pub time: f64,
 }
 
-/// A scene file in our words.
+/// A scene file in the native format.
 #[derive(Clone, Debug)]
 pub struct Imported {
     /// The scene.
     pub desc: SceneDesc,
     /// What it names that is no file.
     pub assets: Arc<Assets>,
-    /// What became of the file's parameters; empty for our own format.
+    /// What became of the file's parameters; empty for the native format.
     pub report: ImportReport,
     /// The files beside the scene's own that were read to make it, as far as they are known by then.
     pub files: Arc<BTreeSet<PathBuf>>,
-    /// The places in the file that became `shapes[0]`, `materials.floor` and so on; empty for our own format.
+    /// The places in the file that became `shapes[0]`, `materials.floor` and so on; empty for the native format.
     pub places: Arc<BTreeMap<String, String>>,
 }
 

@@ -5,6 +5,13 @@ use crate::color::Rgb;
 use crate::id::LightId;
 use crate::integrator::light_events::{LightEvent, LobeWeights};
 
+/// A path that is compacted, by its indices in the wave.
+#[derive(Clone, Copy)]
+pub(super) struct PathMove {
+    pub from: usize,
+    pub to: usize,
+}
+
 /// State beside paths and shadow rays.
 #[derive(Default)]
 pub(super) struct LightAovs {
@@ -47,7 +54,7 @@ impl LightAovs {
     pub fn append(
         &mut self,
         context: &Context,
-        [path, compacted]: [usize; 2],
+        PathMove { from, to }: PathMove,
         lobes: impl FnOnce() -> LobeWeights,
         feature_factor: impl FnOnce() -> Option<Rgb>,
     ) {
@@ -55,11 +62,11 @@ impl LightAovs {
             if context.bounce == 0 {
                 self.lobes.push(lobes());
             } else {
-                self.lobes[compacted] = self.lobes[path];
+                self.lobes[to] = self.lobes[from];
             }
         }
-        if let Some(&before) = self.features.get(path) {
-            self.features[compacted] = before.and_then(|before| feature_factor().map(|factor| before * factor));
+        if let Some(&before) = self.features.get(from) {
+            self.features[to] = before.and_then(|before| feature_factor().map(|factor| before * factor));
         }
     }
 

@@ -21,7 +21,7 @@ pub(super) fn pass_boundaries(context: &Context, wave: &mut Wave) -> u64 {
         let (paths, state) = (&mut paths[block], &mut media[index]);
         let mut ray = rays[block].get(i);
         let start = ray.origin;
-        let segment = context.world.arrive(&mut ray, hits[block].get(i), state);
+        let segment = context.world.trace_through_null_boundaries(&mut ray, hits[block].get(i), state);
         hits[block].set(i, segment.hit);
         paths.throughput.set(i, paths.throughput.get(i) * segment.transmittance);
         light_aovs.absorb(index, segment.transmittance);

@@ -10,12 +10,12 @@ use crate::id::LightId;
 use crate::integrator::light_events::LightEvent;
 use crate::light::{EnvironmentScratch, InfiniteLightEval, InfiniteLightEvalRows};
 use crate::math::Vec3;
-use crate::math::rows::{BATCH, Vectors};
+use crate::math::rows::{BATCH, Vec3Rows};
 
 /// Buffers of one block.
 #[derive(Default)]
 pub(super) struct MissScratch {
-    directions: Vectors,
+    directions: Vec3Rows,
     evals: InfiniteLightEvalRows,
     environment: EnvironmentScratch,
 }

@@ -163,7 +163,7 @@ impl PathIntegrator {
                 direct::sample(context, regions.as_ref(), wave, block);
                 caustics::gather(context, wave, block, out);
                 scatter::sample(context, regions.as_ref(), wave, block);
-                wave.append(context, block, &mut survivors);
+                survivors = wave.append(context, block, survivors);
             }
             wave.finish_bounce(survivors);
             trace::shadow(context, wave, out, counts);

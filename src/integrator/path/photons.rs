@@ -84,7 +84,7 @@ pub(super) fn trace(
             wave.draw(&context);
             scatter::sample(&context, None, wave, block);
             keep_delta_lobes(&mut wave.vertices);
-            wave.append(&context, block, &mut survivors);
+            survivors = wave.append(&context, block, survivors);
         }
         wave.finish_bounce(survivors);
     }

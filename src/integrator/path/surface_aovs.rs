@@ -7,7 +7,7 @@ use super::wave::Wave;
 use crate::color::Rgb;
 use crate::film::SurfaceSample;
 use crate::geometry::SurfaceInteraction;
-use crate::integrator::surface::{place_sample, set_features};
+use crate::integrator::surface::{geometry_aovs, set_features};
 use crate::math::rows::BATCH;
 use crate::math::{Frame, Vec3};
 
@@ -37,7 +37,7 @@ fn write_surfaces(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
         let at = vertices.interaction(lane);
         let surface = &mut out.batch.surfaces[paths[block].slot[i] as usize];
         if context.bounce == 0 {
-            *surface = place_sample(context.pass, needs, &at, hits[block].get(i).as_ref());
+            *surface = geometry_aovs(context.pass, needs, &at, hits[block].get(i).as_ref());
         }
         if features.is_some() || needs.albedo {
             let albedo = albedo(context, vertices, lane, &at);

@@ -9,7 +9,7 @@ use crate::geometry::{Hit, Shape, TrianglePoints, interpolated_normal, interpola
 use crate::id::ShapeId;
 use crate::integrator::shading::{adapted_normal, is_consistent};
 use crate::math::compact::{Compaction, collect_lanes};
-use crate::math::rows::{BATCH, Element, Row, Vectors};
+use crate::math::rows::{BATCH, Element, Row, Vec3Rows};
 use crate::math::vectorize::vectorize;
 use crate::math::{Frame, RayRows, Vec2};
 
@@ -96,7 +96,7 @@ fn start_vertices(vertices: &mut Vertices, lanes: &Compaction, paths: &PathRows,
     lanes.compact(&hits.instance, &mut rows.instance);
     rows.flags = [0; BATCH];
     // Not every hit sets them.
-    rows.dp_du = Vectors::ZERO;
+    rows.dp_du = Vec3Rows::ZERO;
     rows.uv = <Vec2 as Element>::ZERO;
     rows.uv_density = [0.0; BATCH];
 }
@@ -178,23 +178,23 @@ fn intersect_triangles<const SMOOTH: bool, const UV: bool>(
 ) {
     for i in 0..count.min(BATCH) {
         let corners = TrianglePoints { a: triangles.a.get(i), b: triangles.b.get(i), c: triangles.c.get(i) };
-        let place = corners.place(triangles.origin.get(i), rows.direction.get(i));
-        points.p.set(i, place.p);
-        rows.t[i] = place.t as f32;
-        rows.error[i] = place.error;
-        rows.is_unresolved[i] |= u32::from(!place.is_valid());
-        rows.n_g.set(i, place.n_g);
+        let hit = corners.intersect_plane(triangles.origin.get(i), rows.direction.get(i));
+        points.p.set(i, hit.p);
+        rows.t[i] = hit.t as f32;
+        rows.error[i] = hit.error;
+        rows.is_unresolved[i] |= u32::from(!hit.is_valid());
+        rows.n_g.set(i, hit.n_g);
         let n_s = if SMOOTH {
             let normals = [triangles.n_a.get(i), triangles.n_b.get(i), triangles.n_c.get(i)];
-            interpolated_normal(normals, [triangles.u[i], triangles.v[i]], place.n_g).0
+            interpolated_normal(normals, [triangles.u[i], triangles.v[i]], hit.n_g).0
         } else {
-            place.n_g
+            hit.n_g
         };
         rows.n_s.set(i, n_s);
         if UV {
             let corners = [triangles.uv_a.get(i), triangles.uv_b.get(i), triangles.uv_c.get(i)];
             rows.uv.set(i, interpolated_uv(corners, [triangles.u[i], triangles.v[i]]));
-            rows.uv_density[i] = uv_density(uv_area(corners), place.double_area);
+            rows.uv_density[i] = uv_density(uv_area(corners), hit.double_area);
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::block::{Vertices, spawn};
 use super::caustics::CausticState;
 use super::guided::GuideRecorder;
-use super::light_aovs::LightAovs;
+use super::light_aovs::{LightAovs, PathMove};
 use super::miss::MissScratch;
 use super::photons::PhotonState;
 use super::terminator::TerminatorRays;
@@ -205,8 +205,8 @@ impl Wave {
     }
 
     /// Queues the shadow rays of a block's vertices and moves the paths that go on to the index `survivors` and those
-    /// after it.
-    pub fn append(&mut self, context: &Context, block: usize, survivors: &mut usize) {
+    /// after it; the result is the number of all paths that go on so far.
+    pub fn append(&mut self, context: &Context, block: usize, survivors: usize) -> usize {
         if context.config.clamp.is_finite() {
             self.vertices.clamp_direct(context);
         }
@@ -214,13 +214,13 @@ impl Wave {
         let Vertices { count, scatter, .. } = &self.vertices;
         let lanes = Compaction::equal(&scatter.status, spawn::SPAWNED, *count);
         if lanes.is_empty() {
-            return;
+            return survivors;
         }
         if self.has_optional_columns() || context.needs_aov_state() {
-            self.append_optional(context, block, *survivors);
+            self.append_optional(context, block, survivors);
         }
         let Vertices { rows, points, scatter, .. } = &self.vertices;
-        let (to, at) = (*survivors / BATCH, *survivors % BATCH);
+        let (to, at) = (survivors / BATCH, survivors % BATCH);
         let (paths, next_paths) = pair(&mut self.paths, to);
         let (rays, next_rays) = pair(&mut self.rays, to);
         append!(lanes, at, paths, next_paths, {
@@ -239,7 +239,7 @@ impl Wave {
             lanes, at, rays, next_rays, { rows.time => time, },
             { scatter.origin => origin, scatter.direction => direction, }
         );
-        *survivors += lanes.len();
+        survivors + lanes.len()
     }
 
     /// Sets the intervals of the rays that go on.
@@ -304,7 +304,7 @@ impl Wave {
             }
             if context.needs_aov_state() {
                 let lobes = || vertices.sampled_lobes(context.scene, lane);
-                light_aovs.append(context, [path, to], lobes, || vertices.feature_factor(lane));
+                light_aovs.append(context, PathMove { from: path, to }, lobes, || vertices.feature_factor(lane));
             }
         }
     }

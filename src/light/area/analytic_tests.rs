@@ -5,7 +5,7 @@ use super::*;
 use crate::geometry::{Disk, Frustum, Quad, Sphere};
 use crate::id::LightId;
 use crate::light::{Light, LightContext, LightQueries, LightSet, MisCompensation};
-use crate::math::rows::{BATCH, Points};
+use crate::math::rows::{BATCH, DVec3Rows};
 use crate::math::{DAffine3, DMat3, Rng, Transform};
 use crate::sampling::SampleRows;
 
@@ -130,13 +130,13 @@ fn emitters_sampled_together_have_the_bits_of_those_sampled_alone() {
         .flat_map(|i| {
             [WHITE, TWO_SIDED].map(|emission| AreaLight::new(ShapeId::new(i), PrimId(0), emission, &geometry, &[]))
         })
-        .filter(|light| matches!(light.form, Form::Sphere(_) | Form::TransformedShape { .. }))
+        .filter(|light| matches!(light.form, EmitterShape::Sphere(_) | EmitterShape::TransformedShape { .. }))
         .collect();
     let mut random = Rng::new(31);
     let mut queue = EmitterQueue::default();
     let set = LightSet::new(lights.iter().cloned().map(Light::Area).collect(), &geometry);
     let context = LightContext { geometry: &geometry, textures: &[], lights: &set, compensation: MisCompensation::Off };
-    let mut points = Points::ZERO;
+    let mut points = DVec3Rows::ZERO;
     let mut sampled = 0;
     for kinds in [1, 2, 4, 4, 4, 4, lights.len()] {
         queue.clear();

@@ -1,6 +1,6 @@
 //! Spheres and other analytic shapes that many vertices sample at once, the same as each of them alone.
 
-use super::{AreaLight, EmitterSample, Form, SphereEmitter};
+use super::{AreaLight, EmitterSample, EmitterShape, SphereEmitter};
 use crate::geometry::{Geometry, Shape, WorldSampleRows};
 use crate::id::LightId;
 use crate::light::{Light, LightContext, LightQueries, LightSample};
@@ -54,7 +54,9 @@ impl EmitterQueue {
     /// Queues the sample of a light for the vertex `lane`; `false` if the light is not sampled here.
     #[inline(always)]
     pub fn push(&mut self, light: &AreaLight, id: LightId, lane: usize) -> bool {
-        if !(light.emission.is_even() && matches!(light.form, Form::Sphere(_) | Form::TransformedShape { .. })) {
+        if !(light.emission.is_even()
+            && matches!(light.form, EmitterShape::Sphere(_) | EmitterShape::TransformedShape { .. }))
+        {
             return false;
         }
         self.entries.push((id, lane));
@@ -95,13 +97,13 @@ impl EmitterRows {
     fn sample(&mut self, light: &AreaLight, geometry: &Geometry, count: usize) -> bool {
         let Self { u, views, samples } = self;
         match (&light.form, geometry.shape(light.shape)) {
-            (Form::Sphere(sphere), _)
+            (EmitterShape::Sphere(sphere), _)
                 if !sphere.inward && (0..count.min(BATCH)).all(|i| sphere.sees_front(views.p.get(i))) =>
             {
                 vectorize!(sample_sphere(sphere, u, views, count));
                 true
             }
-            (Form::TransformedShape { .. }, Shape::Analytic(placed)) if placed.samples_in_rows() => {
+            (EmitterShape::TransformedShape { .. }, Shape::Analytic(placed)) if placed.samples_in_rows() => {
                 placed.sample_area_rows(u, count, samples);
                 vectorize!(see_samples(samples, views, count));
                 true
@@ -115,7 +117,7 @@ impl EmitterRows {
 fn sample_of_row(light: &AreaLight, views: &ViewRows, i: usize) -> Option<LightSample> {
     let (n, wi, pdf) = (views.n.get(i).as_vec3(), views.wi.get(i).as_vec3(), views.pdf[i] as f32);
     let sample = EmitterSample { p: views.q.get(i), n, wi, pdf }.if_valid()?;
-    let is_seen = light.emission.two_sided || matches!(light.form, Form::Sphere(_)) || wi.dot(n) < 0.0;
+    let is_seen = light.emission.two_sided || matches!(light.form, EmitterShape::Sphere(_)) || wi.dot(n) < 0.0;
     is_seen.then(|| sample.with_radiance(light.emission.radiance, 0.0))
 }
 

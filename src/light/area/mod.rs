@@ -87,12 +87,12 @@ pub struct AreaLight {
     pub emission: Emission,
     /// Mean of the radiance's luminance over the surface; above 0 wherever anything is emitted.
     luminance: f32,
-    form: Form,
+    form: EmitterShape,
 }
 
 /// What is computed of the surface once. Meshes may have millions of triangles, so this is small.
 #[derive(Clone, Debug)]
-enum Form {
+enum EmitterShape {
     Sphere(Box<SphereEmitter>),
     Parallelogram(Box<ParallelogramEmitter>),
     /// A triangle of a mesh, which is looked up again.
@@ -158,16 +158,18 @@ impl AreaLight {
     /// The light of one primitive of a shape that stands in the world (not within an object).
     pub fn new(shape: ShapeId, prim: PrimId, emission: Emission, geometry: &Geometry, textures: &[Texture]) -> Self {
         let mut form = match geometry.shape(shape) {
-            Shape::Mesh(mesh) => Form::Triangle { area: TriangleEmitter::new(&mesh.triangle_points(prim)).area() },
+            Shape::Mesh(mesh) => {
+                EmitterShape::Triangle { area: TriangleEmitter::new(&mesh.triangle_points(prim)).area() }
+            }
             // Through the holes of a sphere its far side is seen, which only sampling by area finds.
-            Shape::Analytic(placed) if emission.opacity.is_some() => Form::by_area(placed),
-            Shape::Analytic(placed) => Form::analytic(placed),
+            Shape::Analytic(placed) if emission.opacity.is_some() => EmitterShape::by_area(placed),
+            Shape::Analytic(placed) => EmitterShape::analytic(placed),
         };
         let mut luminance = emission.radiance.luminance();
         if !emission.is_even() {
             let brightness = |point: &Footprint| emission.expected(textures, point).luminance();
             luminance = textured::mean(geometry.shape(shape), prim, brightness).max(textured::LEAST_MEAN * luminance);
-            if let Form::Parallelogram(quad) = &mut form {
+            if let EmitterShape::Parallelogram(quad) = &mut form {
                 quad.texels = textured::density(brightness).map(Box::new);
             }
         }
@@ -181,7 +183,7 @@ impl AreaLight {
     pub fn for_shape(shape: ShapeId, emission: Emission, geometry: &Geometry, textures: &[Texture]) -> Vec<Self> {
         let first = PrimId(0);
         if let Shape::Mesh(mesh) = geometry.shape(shape) {
-            if let Some(form) = Form::two_triangles(mesh).filter(|_| emission.is_even()) {
+            if let Some(form) = EmitterShape::two_triangles(mesh).filter(|_| emission.is_even()) {
                 return vec![Self { shape, prim: first, emission, luminance: emission.radiance.luminance(), form }];
             }
             return (0..mesh.triangles().len())
@@ -212,7 +214,7 @@ impl AreaLight {
     #[inline(never)]
     fn sample_textured(&self, geometry: &Geometry, textures: &[Texture], p: DVec3, u: [f32; 2]) -> Option<LightSample> {
         let (sample, error) = match &self.form {
-            Form::Parallelogram(quad) => (quad.sample_textured(p, u, self.emission.two_sided)?, quad.error),
+            EmitterShape::Parallelogram(quad) => (quad.sample_textured(p, u, self.emission.two_sided)?, quad.error),
             _ => self.sample_surface(geometry, p, u)?,
         };
         let radiance =
@@ -226,10 +228,10 @@ impl AreaLight {
     fn sample_surface(&self, geometry: &Geometry, p: DVec3, u: [f32; 2]) -> Option<(EmitterSample, f32)> {
         let both = self.emission.two_sided;
         Some(match &self.form {
-            Form::Sphere(sphere) if both || sphere.sees_front(p) => (sphere.sample(p, u)?, 0.0),
-            Form::Parallelogram(quad) => (quad.sample(p, u, both)?, quad.error),
-            Form::Triangle { .. } => self.sample_triangle(geometry, p, u)?,
-            Form::TransformedShape { .. } => {
+            EmitterShape::Sphere(sphere) if both || sphere.sees_front(p) => (sphere.sample(p, u)?, 0.0),
+            EmitterShape::Parallelogram(quad) => (quad.sample(p, u, both)?, quad.error),
+            EmitterShape::Triangle { .. } => self.sample_triangle(geometry, p, u)?,
+            EmitterShape::TransformedShape { .. } => {
                 let Shape::Analytic(placed) = geometry.shape(self.shape) else { return None };
                 let point = placed.sample_area(u);
                 let sample = EmitterSample::from_area(p, point.p, point.n.as_dvec3(), point.pdf_area)?;
@@ -263,7 +265,7 @@ impl AreaLight {
     #[inline]
     fn even_parallelogram(&self) -> Option<&ParallelogramEmitter> {
         match &self.form {
-            Form::Parallelogram(quad) if self.emission.is_even() => Some(quad),
+            EmitterShape::Parallelogram(quad) if self.emission.is_even() => Some(quad),
             _ => None,
         }
     }
@@ -276,10 +278,10 @@ impl AreaLight {
             return 0.0;
         }
         match &self.form {
-            Form::Sphere(sphere) => sphere.pdf(p, at.p),
-            Form::Parallelogram(quad) => quad.pdf(p, at.p),
-            Form::Triangle { area } => EmitterSample::pdf_from_area(p, at.p, at.n_g.as_dvec3(), 1.0 / area),
-            Form::TransformedShape { .. } => {
+            EmitterShape::Sphere(sphere) => sphere.pdf(p, at.p),
+            EmitterShape::Parallelogram(quad) => quad.pdf(p, at.p),
+            EmitterShape::Triangle { area } => EmitterSample::pdf_from_area(p, at.p, at.n_g.as_dvec3(), 1.0 / area),
+            EmitterShape::TransformedShape { .. } => {
                 let Shape::Analytic(placed) = geometry.shape(self.shape) else { return 0.0 };
                 // Where the normal does not determine the density, the hit itself does.
                 let pdf_area = placed.pdf_area_from_normal(at.n_g).or_else(|| placed.pdf_area(ray));
@@ -291,9 +293,9 @@ impl AreaLight {
     /// Area of the surface, in the world.
     pub fn area(&self) -> f64 {
         match &self.form {
-            Form::Sphere(sphere) => sphere.area(),
-            Form::Parallelogram(quad) => quad.area(),
-            Form::Triangle { area } | Form::TransformedShape { area } => *area,
+            EmitterShape::Sphere(sphere) => sphere.area(),
+            EmitterShape::Parallelogram(quad) => quad.area(),
+            EmitterShape::Triangle { area } | EmitterShape::TransformedShape { area } => *area,
         }
     }
 
@@ -301,12 +303,12 @@ impl AreaLight {
     pub(super) fn bounds(&self, geometry: &Geometry) -> Option<LightBounds> {
         let shape = geometry.shape(self.shape);
         let (bounds, normal) = match &self.form {
-            Form::Sphere(_) => (shape.bounds(), None),
-            Form::Parallelogram(quad) => (shape.bounds(), Some(quad.normal())),
-            Form::Triangle { .. } => {
+            EmitterShape::Sphere(_) => (shape.bounds(), None),
+            EmitterShape::Parallelogram(quad) => (shape.bounds(), Some(quad.normal())),
+            EmitterShape::Triangle { .. } => {
                 (shape.prim_bounds(self.prim), self.triangle(geometry).map(|triangle| triangle.normal()))
             }
-            Form::TransformedShape { .. } => (shape.bounds(), flat_normal(shape)),
+            EmitterShape::TransformedShape { .. } => (shape.bounds(), flat_normal(shape)),
         };
         let cone = normal.map_or(EmissionCone::SPHERE, EmissionCone::flat);
         // Of a closed convex surface, a quarter of the area is seen from far away.
@@ -323,7 +325,7 @@ impl AreaLight {
     }
 }
 
-impl Form {
+impl EmitterShape {
     fn analytic(placed: &TransformedShape) -> Self {
         match (&placed.shape, placed.transform.uniform_scale()) {
             (Analytic::Sphere(sphere), Some(scale)) if sphere.is_full() => Self::Sphere(Box::new(SphereEmitter {

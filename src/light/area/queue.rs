@@ -6,7 +6,7 @@ use crate::color::Rgb;
 use crate::id::LightId;
 use crate::light::{LightQueries, LightSampleRows, light_target};
 use crate::math::DVec3;
-use crate::math::rows::{BATCH, Element, Points, Row, pair, soa};
+use crate::math::rows::{BATCH, DVec3Rows, Element, Row, pair, soa};
 use crate::math::vectorize::vectorize;
 use crate::sampling::SampleRows;
 
@@ -89,7 +89,7 @@ impl NearQueue {
         shapes: &ParallelogramRows,
         queries: &LightQueries,
         views: &mut ViewRows,
-        target_p: &mut Points,
+        target_p: &mut DVec3Rows,
     ) {
         let Self { lanes, u, shapes: near_shapes, points, views: near_views } = self;
         let mut near = 0;
@@ -144,7 +144,13 @@ impl AreaQueue {
     }
 
     /// Samples all lights. Samples and targets of vertices that are not queued are overwritten, with no sample.
-    pub fn sample(&mut self, queries: &LightQueries, pmfs: &Row, samples: &mut LightSampleRows, target_p: &mut Points) {
+    pub fn sample(
+        &mut self,
+        queries: &LightQueries,
+        pmfs: &Row,
+        samples: &mut LightSampleRows,
+        target_p: &mut DVec3Rows,
+    ) {
         let Self { count, shapes, emissions, views, near, .. } = self;
         if *count == 0 {
             samples.target = [light_target::NONE; BATCH];
@@ -161,10 +167,10 @@ impl AreaQueue {
 fn sample_by_area(
     shapes: &ParallelogramRows,
     emissions: &EmissionRows,
-    points: &Points,
+    points: &DVec3Rows,
     u: &SampleRows,
     views: &mut ViewRows,
-    target_p: &mut Points,
+    target_p: &mut DVec3Rows,
     count: usize,
 ) {
     for i in 0..count.next_multiple_of(16).min(BATCH) {

@@ -5,7 +5,7 @@ use crate::id::LightId;
 use crate::light::test_support::assert_chi_squared;
 use crate::light::{LightQueries, LightSampleRows, light_target};
 use crate::math::Rng;
-use crate::math::rows::{BATCH, Points};
+use crate::math::rows::{BATCH, DVec3Rows};
 use crate::sampling::SampleRows;
 
 const WHITE: Emission = Emission::constant(Rgb::WHITE);
@@ -117,7 +117,11 @@ fn a_sphere_light_gives_the_closed_form_irradiance() {
         prim: PrimId(0),
         emission: WHITE,
         luminance: 1.0,
-        form: Form::Sphere(Box::new(SphereEmitter { center: DVec3::new(1.2, 0.0, 1.6), radius: 0.5, inward: false })),
+        form: EmitterShape::Sphere(Box::new(SphereEmitter {
+            center: DVec3::new(1.2, 0.0, 1.6),
+            radius: 0.5,
+            inward: false,
+        })),
     };
     let e = irradiance(&[light], &Geometry::default(), DVec3::ZERO, DVec3::Z);
     assert!((e / (PI * 0.0625 * 0.8) - 1.0).abs() < 1e-4, "{e}");
@@ -174,7 +178,7 @@ fn queued_samples_have_the_bits_of_single_ones() {
     lights.extend(AreaLight::for_shape(ShapeId(0), WHITE, &skewed, &[]));
     let mut random = Rng::new(13);
     let mut queue = AreaQueue::default();
-    let mut points = Points::ZERO;
+    let mut points = DVec3Rows::ZERO;
     for count in [1, 16, 100, BATCH] {
         queue.clear();
         let vertices: Vec<_> =
@@ -186,7 +190,7 @@ fn queued_samples_have_the_bits_of_single_ones() {
             points.set(lane, *p);
             assert!(!is_queued(lane) || queue.push(&lights[*i], LightId::new(*i), lane));
         }
-        let (mut samples, mut target_p) = (LightSampleRows::default(), Points::ZERO);
+        let (mut samples, mut target_p) = (LightSampleRows::default(), DVec3Rows::ZERO);
         queue.sample(&LightQueries { count, points: &points, u: &numbers }, &[0.5; BATCH], &mut samples, &mut target_p);
         let mut sampled = 0;
         for (lane, (i, p, u)) in vertices.iter().enumerate() {

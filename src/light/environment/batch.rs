@@ -5,7 +5,7 @@ use super::{EnvironmentMap, Location};
 use crate::color::{Rgb, RgbRows};
 use crate::light::{InfiniteLightEvalRows, MisCompensation};
 use crate::math::Vec3;
-use crate::math::rows::{BATCH, Element, Vectors, soa};
+use crate::math::rows::{BATCH, Element, Vec3Rows, soa};
 use crate::math::vectorize::vectorize;
 use crate::sampling::PiecewiseCell;
 
@@ -94,7 +94,7 @@ impl EnvironmentScratch {
     pub fn eval(
         &mut self,
         map: &EnvironmentMap,
-        directions: &Vectors,
+        directions: &Vec3Rows,
         count: usize,
         compensation: Option<MisCompensation>,
         evals: &mut InfiniteLightEvalRows,
@@ -159,7 +159,7 @@ fn look_up(
 
 // Whole vectors, here and below: what is computed beyond the count is not used.
 #[inline(always)]
-fn locate(map: &EnvironmentMap, directions: &Vectors, locations: &mut LocationRows, count: usize) {
+fn locate(map: &EnvironmentMap, directions: &Vec3Rows, locations: &mut LocationRows, count: usize) {
     for i in 0..count.next_multiple_of(16).min(BATCH) {
         locations.set(i, map.locate(directions.get(i)));
     }

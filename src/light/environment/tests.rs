@@ -5,7 +5,7 @@ use crate::geometry::Geometry;
 use crate::id::LightId;
 use crate::light::test_support::assert_chi_squared;
 use crate::light::{DirectionalLight, InfiniteLightEvalRows, Light, LightSet};
-use crate::math::rows::{BATCH, Vectors};
+use crate::math::rows::{BATCH, Vec3Rows};
 use crate::math::{DVec3, Rng};
 
 fn map(width: usize, height: usize, texel: impl Fn(usize, usize) -> f32) -> EnvironmentMap {
@@ -203,7 +203,7 @@ fn many_directions_at_once_are_each_of_them() {
     let mut rng = Rng::new(77);
     let map = map(37, 19, |x, y| if y < 3 { 0.0 } else { ((x * 7 + y * 3) % 11) as f32 });
     let sky = environment(map.clone());
-    let mut directions = Vectors::ZERO;
+    let mut directions = Vec3Rows::ZERO;
     let mut scratch = EnvironmentScratch::default();
     for count in [1, 17, BATCH, BATCH, BATCH, BATCH] {
         (0..count).for_each(|i| directions.set(i, (rng.cube() - 0.5).as_vec3().normalize()));

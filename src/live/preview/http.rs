@@ -12,14 +12,14 @@ const MAX_HEADERS: usize = 64;
 
 /// How long readers are waited for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Patience {
+pub struct HttpTimeouts {
     /// A connection ends after this time without a request, or without a byte of a response taken.
     pub stall: Duration,
     /// Bytes a second that a reader has to take, after a first `stall`; at least 1.
     pub least_rate: u64,
 }
 
-impl Default for Patience {
+impl Default for HttpTimeouts {
     /// Ten seconds, and 1 MiB a second.
     fn default() -> Self {
         Self { stall: Duration::from_secs(10), least_rate: 1 << 20 }
@@ -83,7 +83,7 @@ impl Request {
 /// A connection to a browser.
 pub struct Connection {
     stream: TcpStream,
-    patience: Patience,
+    timeouts: HttpTimeouts,
     /// When the present response has to be sent.
     deadline: Option<Instant>,
     /// What has been read and not yet been used.
@@ -91,17 +91,17 @@ pub struct Connection {
 }
 
 impl Connection {
-    pub fn new(stream: TcpStream, patience: Patience) -> io::Result<Self> {
-        stream.set_read_timeout(Some(patience.stall))?;
-        stream.set_write_timeout(Some(patience.stall))?;
+    pub fn new(stream: TcpStream, timeouts: HttpTimeouts) -> io::Result<Self> {
+        stream.set_read_timeout(Some(timeouts.stall))?;
+        stream.set_write_timeout(Some(timeouts.stall))?;
         stream.set_nodelay(true)?;
-        Ok(Self { stream, patience, deadline: None, buffer: Vec::new() })
+        Ok(Self { stream, timeouts, deadline: None, buffer: Vec::new() })
     }
 
     /// The next request; `None` if there is none. Its head must arrive in time, and its host must be this machine or
     /// `host`.
     pub fn request(&mut self, host: &str) -> io::Result<Option<Result<Request, HttpError>>> {
-        let deadline = Instant::now() + self.patience.stall;
+        let deadline = Instant::now() + self.timeouts.stall;
         loop {
             match parse(&self.buffer, host) {
                 Some(Ok((request, length))) => {
@@ -153,7 +153,7 @@ impl Connection {
         );
         // The picture is held until then: who takes it byte by byte must not keep it for ever.
         self.deadline =
-            Some(Instant::now() + self.patience.stall + Duration::from_secs(length / self.patience.least_rate.max(1)));
+            Some(Instant::now() + self.timeouts.stall + Duration::from_secs(length / self.timeouts.least_rate.max(1)));
         self.write(head.as_bytes())
     }
 
@@ -165,7 +165,7 @@ impl Connection {
                 if left.is_zero() {
                     return Err(ErrorKind::TimedOut.into());
                 }
-                self.stream.set_write_timeout(Some(left.min(self.patience.stall)))?;
+                self.stream.set_write_timeout(Some(left.min(self.timeouts.stall)))?;
             }
             match self.stream.write(bytes) {
                 Ok(0) => return Err(ErrorKind::WriteZero.into()),

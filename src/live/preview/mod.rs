@@ -17,7 +17,7 @@ use super::{Snapshot, Statistics};
 use crate::desc::ViewDesc;
 use crate::error::{Error, Result};
 use board::Board;
-pub use http::Patience;
+pub use http::HttpTimeouts;
 use http::{Connection, HttpError};
 
 /// More connections than this are turned away.
@@ -36,7 +36,7 @@ pub struct PreviewOptions {
     /// How light is shown until the page's user chooses.
     pub view: ViewDesc,
     /// When slow readers are disconnected, so that they do not keep pictures in memory.
-    pub patience: Patience,
+    pub timeouts: HttpTimeouts,
 }
 
 impl Default for PreviewOptions {
@@ -46,7 +46,7 @@ impl Default for PreviewOptions {
             host: Ipv4Addr::LOCALHOST.to_string(),
             port: 0,
             view: ViewDesc::default(),
-            patience: Patience::default(),
+            timeouts: HttpTimeouts::default(),
         }
     }
 }
@@ -59,7 +59,7 @@ struct Shared {
     view: ViewDesc,
     /// The host given: requests may name it.
     host: String,
-    patience: Patience,
+    timeouts: HttpTimeouts,
     connections: AtomicUsize,
     closing: AtomicBool,
 }
@@ -89,7 +89,7 @@ impl Preview {
             name,
             view: options.view,
             host: host.to_ascii_lowercase(),
-            patience: options.patience,
+            timeouts: options.timeouts,
             connections: AtomicUsize::new(0),
             closing: AtomicBool::new(false),
         });
@@ -165,7 +165,7 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
 
 /// Responds to the requests of a connection, one after the other.
 fn serve(stream: TcpStream, shared: &Shared, has_room: bool) -> std::io::Result<()> {
-    let mut connection = Connection::new(stream, shared.patience)?;
+    let mut connection = Connection::new(stream, shared.timeouts)?;
     if !has_room {
         return connection.refuse(HttpError::Busy);
     }

@@ -16,10 +16,10 @@ use super::{PICTURE_PERIOD, Snapshot};
 use queue::Queue;
 use sender::Sender;
 
-/// Where tev listens by default.
+/// The address of tev by default.
 pub const DEFAULT_ADDRESS: &str = "127.0.0.1:14158";
 
-/// Where tev listens, and how patient to be with it.
+/// The address of tev, and how long to wait for it.
 #[derive(Clone, Debug)]
 pub struct TevOptions {
     /// Host and port.

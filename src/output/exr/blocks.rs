@@ -5,7 +5,6 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
 use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock, CompressedTileBlock, TileCoordinates};
@@ -15,12 +14,14 @@ use exr::compression::Compression;
 use exr::error::{Result as ExrResult, UnitResult};
 use exr::image::write::layers::{LayersWriter, WritableLayers};
 use exr::image::write::samples::WritableSamples;
+use exr::meta::attribute::ChannelDescription;
 use exr::meta::header::Header;
 use exr::meta::{BlockDescription, MetaData};
-use exr::prelude::{AnyChannels, FlatImage, FlatSamples, Layer, f16};
+use exr::prelude::{AnyChannels, Image, Layer, Layers};
 use libdeflater::{CompressionLvl, Compressor};
 use rayon::prelude::*;
 
+use super::channels::LineSamples;
 use super::header_order::finish_headers;
 use crate::math::vectorize::vectorize;
 
@@ -31,17 +32,20 @@ const LEVEL: i32 = 1;
 ///
 /// # Errors
 /// The error of the system or the library.
-pub fn write_image(image: &FlatImage, out: &mut BufWriter<&mut File>) -> Result<(), String> {
+pub fn write_image<'s, S: LineSamples + WritableSamples<'s>>(
+    image: &'s Image<Layers<AnyChannels<S>>>,
+    out: &mut BufWriter<&mut File>,
+) -> Result<(), String> {
     let headers = image.layer_data.infer_headers(&image.attributes);
     let layers = image.layer_data.create_writer(&headers);
-    exr::block::write(&mut *out, headers, true, |meta, chunks| write_blocks(&meta, image, &layers, chunks))
+    exr::block::write(&mut *out, headers, true, |meta, chunks| write_blocks(&meta, &image.layer_data, &layers, chunks))
         .map_err(|e| e.to_string())?;
     out.flush().and_then(|()| finish_headers(out.get_mut())).map_err(|e| e.to_string())
 }
 
-fn write_blocks(
+fn write_blocks<S: LineSamples>(
     meta: &MetaData,
-    image: &FlatImage,
+    parts: &[Layer<AnyChannels<S>>],
     layers: &impl LayersWriter,
     chunks: &mut (impl ChunksWriter + Send),
 ) -> UnitResult {
@@ -53,7 +57,7 @@ fn write_blocks(
         let header = &meta.headers[index.layer];
         let chunk = match header.compression {
             Compression::ZIP1 | Compression::ZIP16 => {
-                zip.predict(&image.layer_data[index.layer], index);
+                zip.predict(&parts[index.layer], header, index);
                 chunk(header, index, zip.compress().unwrap_or_else(data))?
             }
             _ => UncompressedBlock { index, data: data() }.compress_to_chunk(&meta.headers)?,
@@ -119,12 +123,9 @@ impl Zip {
     }
 
     /// Predicts the bytes of a block, a line of a channel at a time, so that these stay in the cache.
-    fn predict(&mut self, part: &Layer<AnyChannels<FlatSamples>>, index: BlockIndex) {
+    fn predict<S: LineSamples>(&mut self, part: &Layer<AnyChannels<S>>, header: &Header, index: BlockIndex) {
         let (corner, size) = (index.pixel_position, index.pixel_size);
-        let channels = &part.channel_data.list;
-        let pairs: usize =
-            channels.iter().map(|channel| channel.sample_data.sample_type().bytes_per_sample() / 2).sum::<usize>()
-                * size.area();
+        let pairs = header.channels.bytes_per_pixel / 2 * size.area();
         self.predicted.resize(2 * pairs, 0);
         let (firsts, seconds) = self.predicted.split_at_mut(pairs);
         // Nothing is before the first byte of all.
@@ -133,8 +134,11 @@ impl Zip {
         let mut start = 0;
         for y in corner.y()..corner.y() + size.y() {
             let line = y * part.size.x() + corner.x();
-            for channel in channels {
-                append(&channel.sample_data, line..line + size.x(), &mut self.line);
+            for (channel, ChannelDescription { sample_type, .. }) in
+                part.channel_data.list.iter().zip(&header.channels.list)
+            {
+                self.line.resize(2 + size.x() * sample_type.bytes_per_sample(), 0);
+                channel.sample_data.write_line(line, &mut self.line[2..]);
                 let end = start + self.line.len() / 2 - 1;
                 vectorize!(subtract_pairs(&self.line, &mut firsts[start..end], &mut seconds[start..end]));
                 let last = self.line.len() - 2;
@@ -157,22 +161,6 @@ impl Zip {
     }
 }
 
-/// Appends the bytes of samples.
-fn append(samples: &FlatSamples, range: Range<usize>, out: &mut Vec<u8>) {
-    fn convert<T: Copy, const N: usize>(samples: &[T], out: &mut Vec<u8>, to_bytes: impl Fn(T) -> [u8; N]) {
-        let start = out.len();
-        out.resize(start + N * samples.len(), 0);
-        for (bytes, sample) in out[start..].as_chunks_mut().0.iter_mut().zip(samples) {
-            *bytes = to_bytes(*sample);
-        }
-    }
-    match samples {
-        FlatSamples::F16(samples) => convert(&samples[range], out, f16::to_le_bytes),
-        FlatSamples::F32(samples) => convert(&samples[range], out, f32::to_le_bytes),
-        FlatSamples::U32(samples) => convert(&samples[range], out, u32::to_le_bytes),
-    }
-}
-
 /// The first and the second bytes of all pairs but the first, each less the one before it, plus 128.
 #[inline(always)]
 fn subtract_pairs(bytes: &[u8], firsts: &mut [u8], seconds: &mut [u8]) {
@@ -187,8 +175,8 @@ fn subtract_pairs(bytes: &[u8], firsts: &mut [u8], seconds: &mut [u8]) {
 #[cfg(test)]
 mod tests {
     use exr::prelude::{
-        AnyChannel, Blocks, Encoding, Image, ImageAttributes, IntegerBounds, LayerAttributes, LineOrder, ReadChannels,
-        ReadLayers, SmallVec, Vec2, read,
+        AnyChannel, Blocks, Encoding, FlatImage, FlatSamples, ImageAttributes, IntegerBounds, LayerAttributes,
+        LineOrder, ReadChannels, ReadLayers, SmallVec, Vec2, f16, read,
     };
 
     use super::*;
@@ -281,7 +269,7 @@ mod tests {
         let split: Vec<u8> = block.iter().step_by(2).chain(block[1..].iter().step_by(2)).copied().collect();
         let predicted = split.windows(2).map(|pair| pair[1].wrapping_sub(pair[0]).wrapping_add(128));
         let mut zip = Zip::new();
-        zip.predict(&image.layer_data[0], index);
+        zip.predict(&image.layer_data[0], &headers[0], index);
         assert_eq!(zip.predicted, std::iter::once(split[0]).chain(predicted).collect::<Vec<_>>());
     }
 }

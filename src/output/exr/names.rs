@@ -2,7 +2,7 @@
 
 use crate::desc::ExrProfileDesc;
 
-/// Our layers and Blender's passes. Others keep their names, since Blender has none for them.
+/// Steradian's layers and Blender's passes. Others keep their names, since Blender has none for them.
 const BLENDER_PASSES: &[(&str, &str)] = &[
     ("N", "Normal"),
     ("P", "Position"),

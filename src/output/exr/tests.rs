@@ -1,4 +1,4 @@
-use super::plane::to_half;
+use super::channels::to_half;
 use super::*;
 
 use std::path::Path;
@@ -96,7 +96,7 @@ fn files_come_back_exactly() {
             assert_eq!((read.size, read.crop), (image.size, image.crop));
             for (read, written) in read.layers[0].data.iter().zip(&image.layers[0].data) {
                 let expected =
-                    if pixel_type == PixelTypeDesc::Half { to_half(vec![*written])[0].to_f32() } else { *written };
+                    if pixel_type == PixelTypeDesc::Half { to_half([*written])[0].to_f32() } else { *written };
                 assert!(read.is_finite() && *read == expected, "{read} {written}");
             }
             let channels = all_channels(&path);

@@ -5,21 +5,22 @@ use std::io::Write;
 use std::path::Path;
 
 use exr::meta::attribute::IntegerBounds;
-use exr::prelude::{AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, ImageAttributes, LineOrder, Vec2};
+use exr::prelude::{AnyChannel, AnyChannels, Blocks, Encoding, ImageAttributes, LineOrder, Vec2};
 
 use super::blocks::write_image;
+use super::channels::{InterleavedLayer, LayerSamples, Region};
 use super::coverage::{self, Matte};
 use super::metadata::{Common, Mattes, part_attributes, text};
 use super::names::{channel_name, motion_channels, plain_word};
 use super::plan::{self, PartKind};
-use super::plane::{Plane, Region, SampleSource, planes};
+
 use crate::desc::{CryptoManifestDesc, ExrProfileDesc, OutputDesc};
 use crate::error::Result;
 use crate::film::{Crop, Identities, Image, Layer, LayerInfo, LayerKind, LayerSet};
 use crate::output::color_space::REC709;
 use crate::output::{RenderInfo, write_atomically};
 
-type FileLayer = exr::prelude::Layer<AnyChannels<FlatSamples>>;
+type Part<'a> = exr::prelude::Layer<AnyChannels<LayerSamples<'a>>>;
 
 /// Writes the picture's colour, those of `output`'s layers that it has, and the [noisy](LayerKind::Noisy) picture if
 /// there is one. The display window is the picture without its overscan, the data window what was rendered. Numbers
@@ -40,8 +41,7 @@ pub fn write_exr(path: &Path, image: &Image, output: &OutputDesc, info: &RenderI
         }
     }
     let common = Common { output, info, mattes, texts: &contents.texts, original: windows.original };
-    let planes = planes(&contents.sources, windows.region);
-    let parts = parts(planes, &contents, &common, &windows);
+    let parts = parts(&contents, &common, &windows);
 
     let mut attributes = ImageAttributes::new(windows.display);
     attributes.chromaticities = Some(REC709);
@@ -81,7 +81,7 @@ impl Windows {
 
 /// What goes into a file.
 struct Contents<'a> {
-    sources: Vec<SampleSource<'a>>,
+    layers: Vec<InterleavedLayer<'a>>,
     mattes: Vec<Matte>,
     texts: Vec<(String, String)>,
     /// Descriptions of layers, by the part that they go to.
@@ -91,7 +91,7 @@ struct Contents<'a> {
 impl<'a> Contents<'a> {
     fn new(image: &'a Image, output: &OutputDesc, info: &RenderInfo) -> Self {
         let selected: LayerSet = output.layers.iter().collect();
-        let mut contents = Self { sources: Vec::new(), mattes: Vec::new(), texts: Vec::new(), comments: Vec::new() };
+        let mut contents = Self { layers: Vec::new(), mattes: Vec::new(), texts: Vec::new(), comments: Vec::new() };
         for layer in image.layers.iter().filter(|layer| selected.contains(layer.kind) || layer.kind == LayerKind::Noisy)
         {
             if layer.kind == LayerKind::Motion && motion_channels(output.profile).is_some() {
@@ -123,7 +123,7 @@ impl<'a> Contents<'a> {
             if names.len() == 2 { vec![x, y] } else { halves.to_vec() }
         });
         self.comments.push((PartKind::Utility, comment));
-        self.sources.push(SampleSource {
+        self.layers.push(InterleavedLayer {
             names: names.iter().map(|name| (*name).to_owned()).collect(),
             data: data.collect(),
             half: false,
@@ -155,22 +155,21 @@ impl<'a> Contents<'a> {
             self.comments.push((part, LayerInfo::of(kind).comment));
         }
         let names = names.iter().map(|name| channel_name(output.profile, name)).collect();
-        self.sources.push(SampleSource { names, data, half: plan::is_half(output, kind) });
+        self.layers.push(InterleavedLayer { names, data, half: plan::is_half(output, kind) });
     }
 }
 
 /// The parts of a file, the picture first.
-fn parts(
-    planes: Vec<Plane>,
-    contents: &Contents,
+fn parts<'a>(
+    contents: &'a Contents,
     common: &Common,
     windows: &Windows,
-) -> exr::prelude::Layers<AnyChannels<FlatSamples>> {
+) -> exr::prelude::Layers<AnyChannels<LayerSamples<'a>>> {
     let several = common.output.profile == ExrProfileDesc::Multipart;
-    let mut by_part: [Vec<AnyChannel<FlatSamples>>; 3] = Default::default();
-    for plane in planes {
-        let part = if several { PartKind::of(plane.role) } else { PartKind::Beauty };
-        by_part[part as usize].push(plane.into());
+    let mut by_part: [Vec<AnyChannel<LayerSamples>>; 3] = Default::default();
+    for channel in contents.layers.iter().flat_map(|layer| layer.channels(windows.region)) {
+        let part = if several { PartKind::of(channel.role) } else { PartKind::Beauty };
+        by_part[part as usize].push(channel.into());
     }
     let mut parts = exr::prelude::Layers::new();
     for (channels, (kind, name)) in by_part.into_iter().zip(PartKind::ALL).filter(|(channels, _)| !channels.is_empty())
@@ -186,7 +185,7 @@ fn parts(
         attributes.layer_name = several.then(|| text(name));
         let compression = plan::compression(common.output, kind);
         let encoding = Encoding { compression, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
-        parts.push(FileLayer::new(
+        parts.push(Part::new(
             windows.data.size,
             attributes,
             encoding,

@@ -118,7 +118,7 @@ impl RenderState {
             Planner::Uniform if session.settings.gathers_photons() => EPOCH - missing.start % EPOCH,
             Planner::Uniform => u32::MAX,
         };
-        let tiles = self.tiles_ahead..(self.tiles_ahead + size.tiles).min(all);
+        let tiles = self.tiles_in_partial_pass..(self.tiles_in_partial_pass + size.tiles).min(all);
         let count = if tiles.len() == all { size.samples.min(most).min(missing.len() as u32) } else { 1 };
         (!missing.is_empty()).then_some(Pass { samples: missing.start..missing.start + count, tiles })
     }
@@ -143,11 +143,11 @@ impl RenderState {
             return;
         }
         let all = self.film.tiles().len();
-        self.tiles_ahead = pass.tiles.end % all;
+        self.tiles_in_partial_pass = pass.tiles.end % all;
         self.done += if pass.tiles.end == all { pass.samples.len() as u32 } else { 0 };
         if let Planner::Guided(planner) = &mut self.planner {
             planner.rays = planner.rays.saturating_add(rays.total());
-            if self.tiles_ahead == 0 {
+            if self.tiles_in_partial_pass == 0 {
                 planner.complete_samples(&mut self.film, self.done, session.settings.spp);
             }
         }
@@ -158,7 +158,7 @@ impl RenderState {
         self.torn = true;
         if let Planner::Guided(planner) = &mut self.planner {
             // The guide has learned from only some of the samples, and their weights are unknown.
-            (self.done, self.tiles_ahead) = (planner.discard_iteration(), 0);
+            (self.done, self.tiles_in_partial_pass) = (planner.discard_iteration(), 0);
         }
     }
 
@@ -167,7 +167,7 @@ impl RenderState {
     pub(super) fn can_end(&self) -> bool {
         match &self.planner {
             Planner::Adaptive(planner) => planner.has_pilot(),
-            Planner::Uniform | Planner::Guided(_) => self.tiles_ahead == 0,
+            Planner::Uniform | Planner::Guided(_) => self.tiles_in_partial_pass == 0,
         }
     }
 
@@ -196,7 +196,7 @@ impl RenderState {
     /// The film with all samples.
     pub fn whole_film(&self) -> Cow<'_, Film> {
         match &self.planner {
-            Planner::Guided(planner) if self.done > planner.merged || self.tiles_ahead > 0 => {
+            Planner::Guided(planner) if self.done > planner.merged || self.tiles_in_partial_pass > 0 => {
                 Cow::Owned(planner.whole_film(&self.film, self.done))
             }
             _ => Cow::Borrowed(&self.film),

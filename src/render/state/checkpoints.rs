@@ -45,17 +45,17 @@ impl Checkpoints {
     ) {
         let requested = self.requested.swap(false, Ordering::Relaxed);
         if requested || self.last.elapsed() + next + self.cost >= self.every {
-            self.save(state, elapsed, progress);
+            self.write_checkpoint(state, elapsed, progress);
         }
     }
 
     /// The last pass is done.
     pub(in crate::render) fn finish(&mut self, state: &RenderState, elapsed: Duration, progress: &dyn Progress) {
-        self.save(state, elapsed, progress);
+        self.write_checkpoint(state, elapsed, progress);
     }
 
     /// Writes the state. A failure is a warning and does not end the render: the earlier checkpoint is unchanged.
-    fn save(&mut self, state: &RenderState, elapsed: Duration, progress: &dyn Progress) {
+    fn write_checkpoint(&mut self, state: &RenderState, elapsed: Duration, progress: &dyn Progress) {
         let start = Instant::now();
         let seconds = state.seconds + elapsed.as_secs_f64();
         let written = self.file.replace(|out| state.write_with(&self.header, seconds, out));

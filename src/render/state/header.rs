@@ -89,7 +89,8 @@ pub struct Header {
     /// How many of the shard's samples every pixel has; with a target error their mean, rounded.
     pub done: u32,
     /// How many tiles, the first of the film, have one sample more.
-    pub tiles_ahead: u64,
+    #[serde(rename = "tiles_ahead")]
+    pub tiles_in_partial_pass: u64,
     /// Whether no sample is missing.
     pub complete: bool,
     /// What the film holds.

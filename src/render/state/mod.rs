@@ -45,7 +45,7 @@ pub struct RenderState {
     /// How many of these every pixel has; with a target error their mean, rounded.
     pub done: u32,
     /// How many tiles, the first of the film, have one sample more.
-    pub tiles_ahead: usize,
+    pub tiles_in_partial_pass: usize,
     /// Whether a pass was cancelled: some tiles have samples that others lack, which no file can represent. The picture
     /// is whole.
     pub torn: bool,
@@ -73,7 +73,17 @@ impl RenderState {
     /// Without samples.
     fn of_film(film: Film, planner: Planner, shard: Shard) -> Self {
         let rays = RayCounts::default();
-        Self { film, shard, done: 0, tiles_ahead: 0, torn: false, complete: false, planner, rays, seconds: 0.0 }
+        Self {
+            film,
+            shard,
+            done: 0,
+            tiles_in_partial_pass: 0,
+            torn: false,
+            complete: false,
+            planner,
+            rays,
+            seconds: 0.0,
+        }
     }
 
     /// Continues from the state in a file.
@@ -95,7 +105,7 @@ impl RenderState {
     /// Replaces a state of the same shape and planner by that in a file.
     fn load(&mut self, reader: &mut Reader) -> Result<()> {
         (self.done, self.complete) = (reader.header().done, reader.header().complete);
-        self.tiles_ahead = (reader.header().tiles_ahead as usize).min(self.film.tiles().len() - 1);
+        self.tiles_in_partial_pass = (reader.header().tiles_in_partial_pass as usize).min(self.film.tiles().len() - 1);
         self.rays = rays(reader.header().rays);
         self.seconds = reader.header().render_seconds;
         read_tiles(reader, &mut self.film)?;
@@ -127,7 +137,7 @@ impl RenderState {
         let RayCounts { camera, indirect, shadow } = self.rays;
         let header = Header {
             done: self.done,
-            tiles_ahead: self.tiles_ahead as u64,
+            tiles_in_partial_pass: self.tiles_in_partial_pass as u64,
             complete: self.complete,
             film: self.film.shape().clone(),
             rays: [camera, indirect, shadow],
@@ -191,7 +201,7 @@ fn fits(reader: &Reader, requested: &Header) -> Result<()> {
             "spp: {} in the checkpoint, {} requested, and shards are parts of a fixed number",
             there.spp, requested.spp
         ));
-    } else if there.done + u32::from(there.tiles_ahead > 0) > requested.spp {
+    } else if there.done + u32::from(there.tiles_in_partial_pass > 0) > requested.spp {
         differences.push(format!("spp: pixels have {} samples already, {} requested", there.done, requested.spp));
     }
     if differences.is_empty() {
@@ -204,7 +214,7 @@ fn fits(reader: &Reader, requested: &Header) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Usage`] naming the option if not.
-pub fn check_kept(settings: &Settings, shard: Shard) -> Result<()> {
+pub fn check_resumable(settings: &Settings, shard: Shard) -> Result<()> {
     if shard != Shard::WHOLE && settings.is_guided() {
         return Err(Error::Usage(
             "--shard: not with guiding, for paths learn from nearly all samples before, which each part would render; \

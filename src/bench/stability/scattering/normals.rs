@@ -128,7 +128,7 @@ pub(super) fn g8_visible_normals(effort: Effort) -> Outcome {
     if worst.p_value >= level {
         return outcome;
     }
-    let [ours, other] =
+    let [own, other] =
         worst.histograms.each_ref().map(|cells| cells.iter().copied().map(f64::from).collect::<Vec<_>>());
-    outcome.pictures("normals", COLUMNS, &ours, &other)
+    outcome.pictures("normals", COLUMNS, &own, &other)
 }

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::super::geometry::Rng;
 use super::super::render::{Estimate, merge, pixels, probe, render};
 use super::super::{Effort, Outcome};
-use crate::integrator::{facing_normal, terminator_factor};
+use crate::integrator::{adapt_shading_normal, terminator_factor};
 use crate::math::Vec3;
 
 /// The quad `[-1, 1]^2` at z = 0 whose shading normal leans by an angle towards +x: by a normal map, or by the normals
@@ -127,7 +127,7 @@ fn reflected_below(effort: Effort) -> usize {
     let below = |rng: &mut Rng| {
         let (back, mut n_s) = (random(rng), random(rng));
         n_s.z = n_s.z.abs();
-        let n = facing_normal(back, n_s, Vec3::Z);
+        let n = adapt_shading_normal(back, n_s, Vec3::Z);
         let reflected = 2.0 * back.dot(n) * n - back;
         usize::from(!(reflected.z * back.z > 0.0 && back.dot(n) * back.z > 0.0))
     };

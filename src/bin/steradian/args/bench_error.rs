@@ -24,7 +24,7 @@ Examples:
   steradian bench error cornell.json --reference cornell.exr --sampler sobol,independent --strategy mis,light
       Four variants side by side.
   steradian bench error cornell.json --times 1,2,4,8 --integrator path --clamp 10
-      By time. Without a reference two renders of our own stand in.
+      By time. Without a reference two renders of Steradian stand in.
   steradian bench error cornell.xml --reference cornell.exr --external 'mitsuba=mitsuba -m llvm_ad_rgb -Dspp={spp} -o \
 {out} {scene}'
       Beside another program. {scene} and {out} come quoted for the shell; {seed} is there too, and {seconds} with \

@@ -93,8 +93,8 @@ fn scene_rows(scene: Option<&Path>) -> Result<Vec<SettingRow>> {
         if values.len() < places.len() || values.iter().any(|value| value.as_array().is_some_and(Vec::is_empty)) {
             continue;
         }
-        // A scene in our format has the key or not; in an imported scene, a value that differs from the default was
-        // given.
+        // A scene in the native format has the key or not; in an imported scene, a value that differs from the default
+        // was given.
         let is_given = match &written {
             Some(written) => places.iter().any(|place| written.pointer(place).is_some()),
             None => places.iter().any(|place| desc.pointer(place) != bare.pointer(place)),

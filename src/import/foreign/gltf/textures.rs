@@ -192,8 +192,8 @@ fn flipped(transform: &TextureTransform) -> ([f32; 2], [f32; 2], f64) {
 mod tests {
     use super::*;
 
-    /// What our image lookup does.
-    fn ours([u, v]: [f64; 2], (offset, scale, rotation): ([f32; 2], [f32; 2], f64)) -> [f64; 2] {
+    /// What the image lookup does.
+    fn looked_up([u, v]: [f64; 2], (offset, scale, rotation): ([f32; 2], [f32; 2], f64)) -> [f64; 2] {
         let (sin, cos) = rotation.sin_cos();
         let [u, v] = [u * f64::from(scale[0]), v * f64::from(scale[1])];
         [f64::from(offset[0]) + cos * u - sin * v, f64::from(offset[1]) + sin * u + cos * v]
@@ -217,7 +217,7 @@ mod tests {
             ),
         ];
         for (transform, [u, v], [to_u, to_v]) in cases {
-            let found = ours([u, 1.0 - v], flipped(&transform));
+            let found = looked_up([u, 1.0 - v], flipped(&transform));
             let error = (found[0] - to_u).abs() + (1.0 - found[1] - to_v).abs();
             assert!(error < 1e-6, "{transform:?}: {u} {v} to {found:?}");
         }

@@ -226,7 +226,7 @@ pub(super) fn fov(element: &mut Element, aspect: f64) -> Result<f64> {
     Ok(2.0 * half_height.atan().to_degrees())
 }
 
-/// Where our camera stands: the rotation and translation of `map`.
+/// Where the camera stands: the rotation and translation of `map`.
 fn placement(element: &mut Element, map: &DAffine3) -> Result<TransformDesc> {
     let m = map.matrix3;
     let singular = || element.place_of("to_world").error("the transform of the camera is singular");

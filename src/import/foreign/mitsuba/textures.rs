@@ -15,14 +15,14 @@ use crate::error::Result;
 use crate::image_data::{ImageData, Samples};
 use crate::math::{DAffine3, DMat3, DVec3, dvec3};
 
-/// How the uv of our shape differs from that of Mitsuba's, whose images have their origin at the top left.
+/// How the uv of a shape differs from that in Mitsuba, whose images have their origin at the top left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum UvOrigin {
     /// The same numbers: v grows downward in images.
     Mitsuba,
-    /// Our v is one minus Mitsuba's: v grows upward in images.
+    /// It is one minus Mitsuba's: v grows upward in images.
     Upward,
-    /// Our u is Mitsuba's v and the other way round, as on disks.
+    /// u is Mitsuba's v and the other way round, as on disks.
     Swapped,
 }
 

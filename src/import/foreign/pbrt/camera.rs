@@ -67,8 +67,8 @@ pub fn shutter(params: Option<&Params>) -> Result<[f64; 2]> {
     Ok(shutter)
 }
 
-/// From the space of our camera to that of pbrt's, x to the right, y up, z forward.
-fn pbrt_from_ours(kind: &str) -> DMat3 {
+/// From camera space to that of pbrt's camera, x to the right, y up, z forward.
+fn pbrt_from_camera(kind: &str) -> DMat3 {
     if kind == "spherical" {
         // Columns begin at pbrt's x axis and turn towards z; Steradian's begin at z and turn towards -x.
         DMat3::from_rotation_y(std::f64::consts::FRAC_PI_2)
@@ -153,9 +153,10 @@ pub fn set_camera(draft: &mut Draft, directive: &CameraDirective, size: [u32; 2]
         return Err(params.error("the camera's transform is singular"));
     };
     // What remains of a reflection is taken out of the whole world.
-    let ours = pbrt_from_ours(&directive.kind);
-    let world = World { mirrored: world_from_camera.swaps_handedness() != (ours.determinant() < 0.0), times };
-    let maps = world_from_camera.0.map(|map| world.mirror() * map * DAffine3::from_mat3(ours));
+    let pbrt_from_camera = pbrt_from_camera(&directive.kind);
+    let world =
+        World { mirrored: world_from_camera.swaps_handedness() != (pbrt_from_camera.determinant() < 0.0), times };
+    let maps = world_from_camera.0.map(|map| world.mirror() * map * DAffine3::from_mat3(pbrt_from_camera));
 
     let mut rigid = [DAffine3::IDENTITY; 2];
     let mut scale = 1.0;

@@ -363,12 +363,12 @@ impl Reader {
                     return Err(lexer.error(at, "ObjectEnd without ObjectBegin"));
                 };
                 self.graphics = *graphics;
-                let ours = if object.shapes.is_empty() {
+                let name = if object.shapes.is_empty() {
                     None
                 } else {
                     Some(self.draft.add_object(&object.name, &object.place, object.shapes, Vec::new()))
                 };
-                self.objects.insert(object.name, ours);
+                self.objects.insert(object.name, name);
             }
             _ => {
                 let name = quoted(lexer, at, "a name")?;
@@ -436,9 +436,9 @@ impl Reader {
         };
         let colors = Colors { folder: &self.folder, space: self.graphics.color_space };
         let mut materials = Materials { textures: &self.textures, colors, draft: &mut self.draft };
-        let ours = materials.add(name, kind, params, |name| known(name).map(|material| material.name))?;
+        let added = materials.add(name, kind, params, |name| known(name).map(|material| material.name))?;
         Ok(ShapeMaterial::Material(Material {
-            name: ours,
+            name: added,
             is_textured: params.names_textures()
                 || params.has("normalmap")
                 || parts.iter().any(|part| part.is_textured),

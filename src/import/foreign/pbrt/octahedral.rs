@@ -37,8 +37,8 @@ pub fn direction_from_square([s, t]: [f64; 2]) -> DVec3 {
     DVec3::new(phi.cos().copysign(u) * side, phi.sin().copysign(v) * side, z)
 }
 
-/// A square equal-area image as a lat-long image of our convention, in which pbrt's z is up (our y) and its x stays.
-/// With `mirrored`, x is negated.
+/// A square equal-area image as a lat-long image of Steradian's convention, in which pbrt's z is up (y here) and its x
+/// stays. With `mirrored`, x is negated.
 pub fn lat_long(image: &RgbImage, mirrored: bool) -> RgbImage {
     // Twice as many pixels as the square has, whatever its shape.
     let height = (image.width as f64 * image.height as f64).sqrt().round().clamp(1.0, MAX_ROWS) as usize;
@@ -61,13 +61,13 @@ pub fn lat_long(image: &RgbImage, mirrored: bool) -> RgbImage {
     RgbImage { width, height, pixels }
 }
 
-/// A direction of our lat-long image: the top is +y, the middle column -z, and +x lies at three quarters of the width.
+/// A direction of the lat-long image: the top is +y, the middle column -z, and +x lies at three quarters of the width.
 pub fn direction(u: f64, v: f64) -> DVec3 {
     let (theta, phi) = (PI * v, TAU * u);
     DVec3::new(-theta.sin() * phi.sin(), theta.cos(), theta.sin() * phi.cos())
 }
 
-/// A direction of our image in the space of pbrt's light.
+/// A direction of the lat-long image in the space of pbrt's light.
 pub fn pbrt_from_ours(d: DVec3, mirrored: bool) -> DVec3 {
     DVec3::new(if mirrored { -d.x } else { d.x }, -d.z, d.y)
 }

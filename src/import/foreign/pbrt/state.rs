@@ -132,13 +132,13 @@ impl Default for Times {
 }
 
 impl World {
-    /// Into our world.
+    /// Into the world.
     pub fn mirror(&self) -> DAffine3 {
         let x = if self.mirrored { -1.0 } else { 1.0 };
         DAffine3::from_mat3(DMat3::from_diagonal(DVec3::new(x, 1.0, 1.0)))
     }
 
-    /// A place in our world, and the motion after it.
+    /// A place in the world, and the motion after it.
     pub fn place(&self, ctm: &Ctm, inner: DAffine3) -> (TransformDesc, Vec<KeyframeDesc>) {
         let mirror = self.mirror();
         if !ctm.is_moving() {

@@ -1,4 +1,4 @@
-//! Textures: what they come to in our scene, a constant or a texture there.
+//! Textures: what they come to in a scene description, a constant or a texture there.
 
 use std::collections::BTreeMap;
 

@@ -46,7 +46,7 @@ fn environments_begin_behind() {
         panic!()
     };
     assert_eq!((map.file.as_deref(), map.scale), (Some("a.exr"), 2.0));
-    // Mitsuba's first column, ours behind (+Z), is -Z; a quarter further is +X, for us -X.
+    // Mitsuba's first column, behind the camera here (+Z), is -Z; a quarter further is +X, here -X.
     let transform = map.transform.unwrap();
     assert_point(moved(&transform, [0.0, 0.0, 1.0]), [0.0, 0.0, -1.0]);
     assert_point(moved(&transform, [-1.0, 0.0, 0.0]), [1.0, 0.0, 0.0]);

@@ -22,7 +22,7 @@ fn camera(kind: &str, inside: &str) -> CameraDesc {
 #[test]
 fn the_camera_looks_along_z_with_x_to_the_left() {
     let camera = camera("perspective", "");
-    // Ours looks along -Z with +X to the right.
+    // Steradian's looks along -Z with +X to the right.
     let map = camera.transform.unwrap();
     assert_point(moved(&map, [0.0, 0.0, -1.0]), [0.0, 0.0, 1.0]);
     assert_point(moved(&map, [1.0, 0.0, 0.0]), [-1.0, 0.0, 0.0]);

@@ -29,15 +29,15 @@ const RECTANGLE: &str = r#"<shape type="rectangle">BSDF</shape>"#;
 
 #[test]
 fn images_have_their_origin_at_the_top_left() {
-    // Where Mitsuba's v is ours, images are mirrored; where ours is one minus it, they are not.
+    // Where v is Mitsuba's, images are mirrored; where it is one minus that, they are not.
     let upright = ([1.0, 1.0], 0.0, [0.0, 0.0]);
     let mirrored = ([1.0, -1.0], 0.0, [0.0, 1.0]);
     assert_eq!(image(RECTANGLE, ""), mirrored);
     assert_eq!(image(r#"<shape type="cube">BSDF</shape>"#, ""), mirrored);
     assert_eq!(image(r#"<shape type="cylinder">BSDF</shape>"#, ""), mirrored);
-    // Mitsuba's v of a sphere begins at +z, ours at -z.
+    // Mitsuba's v of a sphere begins at +z, Steradian's at -z.
     assert_eq!(image(r#"<shape type="sphere">BSDF</shape>"#, ""), upright);
-    // Of a disk Mitsuba's u is the radius, ours the angle.
+    // Of a disk Mitsuba's u is the radius, Steradian's the angle.
     let (scale, degrees, _) = image(r#"<shape type="disk">BSDF</shape>"#, "");
     assert_near(degrees.abs(), 90.0);
     assert_near(f64::from(scale[0] * scale[1]), 1.0);

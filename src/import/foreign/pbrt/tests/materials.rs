@@ -48,7 +48,7 @@ fn power_is_that_of_each_shape() {
     let quad = "Shape \"bilinearmesh\" \"point3 P\" [0 0 0 2 0 0 0 2 0 2 2 0]";
     let both =
         emission(&format!("WorldBegin AreaLightSource \"diffuse\" \"float power\" 10 \"bool twosided\" true {quad}"));
-    // One patch of area 4 with two sides, though it is two triangles of ours.
+    // One patch of area 4 with two sides, though it is two triangles here.
     assert!(close(both, [10.0 / (2.0 * pi * 4.0); 3]), "{both:?}");
     let triangles = "Shape \"trianglemesh\" \"point3 P\" [0 0 0 2 0 0 0 2 0 2 2 0] \"integer indices\" [0 1 2 2 1 3]";
     let each = emission(&format!("WorldBegin AreaLightSource \"diffuse\" \"float power\" 10 {triangles}"));

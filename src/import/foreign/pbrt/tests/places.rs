@@ -75,8 +75,8 @@ fn the_scale_of_the_camera_is_that_of_its_lens() {
 #[test]
 fn the_spherical_camera_turns_as_pbrts_does() {
     let imported = read("Camera \"spherical\" \"string mapping\" \"equirectangular\" WorldBegin Shape \"sphere\"");
-    // Its columns turn from x over z; ours from -x over -z. So x is at the left edge, which is our +z, and z, at a
-    // quarter, our -x.
+    // Its columns turn from x over z; Steradian's from -x over -z. So x is at the left edge, which is +z here, and z,
+    // at a quarter, -x here.
     let camera = map(imported.desc.camera.transform.as_ref().unwrap());
     assert!(!is_mirrored(&imported));
     assert!((camera.transform_vector3(DVec3::Z) - DVec3::X).length() < 1e-9);
