@@ -57,6 +57,8 @@ pub struct SceneFeatures {
     pub attributes: bool,
     /// Some material has an image that is filtered over the footprint of a ray.
     pub filtered_textures: bool,
+    /// Some material may have an image.
+    pub image_textures: bool,
     /// Some surface has a normal map or a bump map.
     pub normal_perturbations: bool,
     /// Some surface's shading normal differs from its geometric one.

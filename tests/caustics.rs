@@ -93,8 +93,8 @@ fn photons_and_paths_have_the_same_mean() {
 fn photons_lower_the_error_of_a_small_lamp_behind_glass() {
     let mut scene = balls();
     scene["shapes"][2] = json!({
-        "type": "sphere", "material": "white", "radius": 0.05, "transform": [{ "translate": [0, 2.5, 0] }],
-        "emission": { "radiance": [900, 800, 700] }
+        "type": "sphere", "material": "white", "radius": 0.2, "transform": [{ "translate": [0, 2.5, 0] }],
+        "emission": { "radiance": [60, 50, 45] }
     });
     let difference = |caustics| {
         let [a, b] = [1, 2].map(|seed| of_seed(&scene, caustics, seed, 32));
@@ -105,37 +105,59 @@ fn photons_lower_the_error_of_a_small_lamp_behind_glass() {
     assert!(photons < 0.2 * paths, "{photons} {paths}");
 }
 
-/// Paths never meet a point light. A mirror shows a second one to the floor, so that the irradiance is known.
-#[test]
-fn photons_find_the_caustics_of_point_lights() {
+/// A floor seen from above, beside a mirror that shows it a second lamp: the irradiance of both is known.
+fn lamp_beside_a_mirror(lamp: &Value) -> Value {
     let mut scene = json!({
-        "camera": { "type": "orthographic", "position": [1, 2, 0], "look_at": [1, 0, 0], "up": [0, 0, 1], "view_height": 0.2 },
-        "film": { "width": 8, "height": 8, "filter": { "type": "box" } },
+        "camera": {
+            "type": "orthographic", "position": [2.5, 2, 0], "look_at": [2.5, 0, 0], "up": [0, 0, 1], "view_height": 2.4
+        },
+        "film": { "width": 32, "height": 32, "filter": { "type": "box" } },
         "integrator": { "type": "path", "max_depth": 3 },
         "materials": { "white": { "type": "diffuse", "albedo": 0.5 }, "mirror": { "type": "mirror" } },
         "shapes": [
             { "type": "quad", "material": "white", "origin": [0, 0, 3], "edge_u": [6, 0, 0], "edge_v": [0, 0, -6] },
-            { "type": "quad", "material": "mirror", "origin": [0, 0, -3], "edge_u": [0, 0, 6], "edge_v": [0, 4, 0] }
-        ],
-        "lights": [{ "type": "point", "position": [1, 1, 0], "intensity": [1, 1, 1] }]
+            { "type": "quad", "material": "mirror", "origin": [0, 0, -3], "edge_u": [0, 0, 6], "edge_v": [0, 1, 0] }
+        ]
+    });
+    let place = if lamp["type"] == "sphere" { "shapes" } else { "lights" };
+    scene.as_object_mut().unwrap().entry(place).or_insert(json!([])).as_array_mut().unwrap().push(lamp.clone());
+    scene
+}
+
+/// Mean radiance of that floor by a lamp of intensity 1 at this x, 1 above the floor.
+fn floor_radiance(lamp: f64) -> f64 {
+    let at = |i: i32| (f64::from(i) + 0.5) / 200.0 * 2.4 - 1.2;
+    let points = (0..200).flat_map(|i| (0..200).map(move |j| (at(i) + 2.5 - lamp, at(j))));
+    let irradiance = points.map(|(x, z)| (x * x + 1.0 + z * z).powf(-1.5)).sum::<f64>() / 40_000.0;
+    0.5 / std::f64::consts::PI * irradiance
+}
+
+/// Paths never meet a point light. A sphere of the same intensity has the same irradiance.
+#[test]
+fn photons_find_what_a_mirror_shows_of_a_lamp() {
+    let point = json!({ "type": "point", "position": [1, 1, 0], "intensity": [1, 1, 1] });
+    let sphere = json!({
+        "type": "sphere", "material": "white", "radius": 0.1, "transform": [{ "translate": [1, 1, 0] }],
+        "emission": { "radiance": 100.0 / std::f64::consts::PI }
     });
     let mean = |scene: &Value, caustics, spp| {
         let image = of(scene, caustics, &Overrides { spp: Some(spp), ..Overrides::default() });
         let data = &image.layer(LayerKind::Color).unwrap().data;
         data.iter().map(|x| f64::from(*x)).sum::<f64>() / data.len() as f64
     };
-    // The light above the floor, and its image 2 behind the mirror: cosines over squares of distances.
-    let (direct, mirrored) = (1.0, 5f64.powf(-1.5));
-    let radiance = |irradiance: f64| 0.5 / std::f64::consts::PI * irradiance;
-    let both = mean(&scene, CausticsDesc::Photons, 1024);
-    let without = mean(&scene, CausticsDesc::Paths, 64);
-    assert!((without / radiance(direct) - 1.0).abs() < 0.01, "{without}");
-    // 8 x 8 pixels and 128 maps of photons: 0.5 % is five standard errors, measured over seeds.
-    let found = (both - without) / radiance(mirrored);
-    assert!((found - 1.0).abs() < 0.05, "{found}");
-    // Too short for them.
-    scene["integrator"]["max_depth"] = json!(2);
-    assert!((mean(&scene, CausticsDesc::Photons, 64) / radiance(direct) - 1.0).abs() < 0.01);
+    let (direct, mirrored) = (floor_radiance(1.0), floor_radiance(-1.0));
+    for lamp in [&point, &sphere] {
+        let mut scene = lamp_beside_a_mirror(lamp);
+        let found = (mean(&scene, CausticsDesc::Photons, 512) - direct) / mirrored;
+        // Six standard errors, measured over 20 seeds.
+        assert!((found - 1.0).abs() < 0.02, "{lamp}: {found}");
+        // Paths of two segments are too short for the mirror.
+        scene["integrator"]["max_depth"] = json!(2);
+        let found = mean(&scene, CausticsDesc::Photons, 64) / direct;
+        assert!((found - 1.0).abs() < 0.005, "{lamp}: {found}");
+    }
+    let without = mean(&lamp_beside_a_mirror(&point), CausticsDesc::Paths, 64) / direct;
+    assert!((without - 1.0).abs() < 0.005, "{without}");
 }
 
 #[test]

@@ -49,7 +49,9 @@ pub trait Accelerator: Send + Sync {
     /// Whether there is any hit within the ray's interval.
     fn occluded(&self, ray: &Ray) -> bool;
 
-    /// [`intersect`](Self::intersect) for the first `count` rays, at most [`BATCH`].
+    /// [`intersect`](Self::intersect) for the first `count` rays, at most [`BATCH`]. The distances to analytic shapes
+    /// may be lower bounds, within 2^-10 of the distance of the ray's origin and the world's from the shape: a hit is
+    /// resolved from the shape and the ray.
     fn intersect_rows(&self, rays: &RayRows, count: usize, hits: &mut HitRows, coherence: Coherence) {
         let _ = coherence;
         for lane in 0..count.min(BATCH) {
@@ -67,11 +69,7 @@ pub trait Accelerator: Send + Sync {
 
     /// [`intersect`](Self::intersect) for each ray, in order, in rows. `hits` is as long as `rays`.
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {
-        let mut found = HitRows::default();
-        for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
-            self.intersect_rows(&RayRows::of(rays), rays.len(), &mut found, coherence);
-            hits.iter_mut().enumerate().for_each(|(lane, hit)| *hit = found.get(lane));
-        }
+        intersect_in_rows(self, rays, hits, coherence);
     }
 
     /// [`occluded`](Self::occluded) for each ray, in order, in rows. `occluded` is as long as `rays`.
@@ -95,5 +93,14 @@ pub trait Accelerator: Send + Sync {
     /// The structure and the work of single rays, where they are open.
     fn inspect(&self) -> Option<&dyn Inspect> {
         None
+    }
+}
+
+/// [`Accelerator::intersect_rows`] for any number of rays.
+fn intersect_in_rows<A: Accelerator + ?Sized>(accel: &A, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {
+    let mut found = HitRows::default();
+    for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
+        accel.intersect_rows(&RayRows::of(rays), rays.len(), &mut found, coherence);
+        hits.iter_mut().enumerate().for_each(|(lane, hit)| *hit = found.get(lane));
     }
 }

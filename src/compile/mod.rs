@@ -193,10 +193,9 @@ impl Builder {
         let files = &self.files;
         if !self.space.is_world() {
             self.materials.media.rescale(1.0 / self.space.scale());
-            self.materials
-                .normal_perturbations
-                .iter_mut()
-                .for_each(|normal_perturbation| normal_perturbation.rescale(self.space.scale()));
+            for perturbation in &mut self.materials.normal_perturbations {
+                perturbation.rescale(self.space.scale());
+            }
         }
         self.geometry.cutouts = opacity::cutouts(&self.geometry.shapes, &self.opacities, &self.materials.textures);
         let light_groups = self.lights.groups();
@@ -225,6 +224,7 @@ impl Builder {
             attributes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Mesh(mesh) if mesh.has_attributes())),
             filtered_textures: materials.iter().any(Material::is_textured)
                 && self.materials.textures.textures.iter().any(Texture::is_filtered),
+            image_textures: self.materials.textures.textures.iter().any(Texture::has_image),
             normal_perturbations,
             shading_normals: normal_perturbations || self.geometry.shapes.iter().any(smooth),
             parameters: anisotropic || !self.materials.textures.textures.is_empty(),

@@ -40,6 +40,11 @@ impl Disk {
         self.radius
     }
 
+    /// The radius of the hole; zero where there is none.
+    pub fn inner_radius(&self) -> f64 {
+        self.inner_radius
+    }
+
     /// Whether all angles are kept.
     pub fn is_full_turn(&self) -> bool {
         self.sector.is_full()

@@ -15,8 +15,8 @@ mod spot;
 mod test_support;
 mod tree;
 
-pub(crate) use area::placed_area;
 pub use area::{AreaLight, Emission};
+pub(crate) use area::{placed_area, triangle_error};
 pub use directional::DirectionalLight;
 pub use environment::{Environment, EnvironmentMap, EnvironmentMapError, EnvironmentScratch};
 pub use groups::LightGroups;

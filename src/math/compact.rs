@@ -293,6 +293,32 @@ pub fn collect_lanes(lanes: &mut Vec<u8>, count: usize, mut is_chosen: impl FnMu
     lanes.truncate(chosen);
 }
 
+/// Sorts `lanes` by their keys. Those of one key are in ascending order, and stay so.
+pub fn sort_lanes(lanes: &mut [u8], keys: &Row<u32>) {
+    const BINS: usize = 64;
+    let key = |lane: u8| keys[usize::from(lane) % BATCH];
+    // Counting sort, where there are few keys.
+    let (mut counts, mut bits, mut sorted) = ([0u8; BINS], 0, [0u8; BATCH]);
+    for &lane in &*lanes {
+        bits |= key(lane);
+        counts[key(lane) as usize % BINS] += 1;
+    }
+    if bits >= BINS as u32 || lanes.len() > BATCH {
+        lanes.sort_unstable_by_key(|&lane| u64::from(key(lane)) << 8 | u64::from(lane));
+        return;
+    }
+    let mut first = 0;
+    for count in &mut counts[..=bits as usize] {
+        (*count, first) = (first, first + *count);
+    }
+    for &lane in &*lanes {
+        let place = &mut counts[key(lane) as usize % BINS];
+        sorted[usize::from(*place) % BATCH] = lane;
+        *place += 1;
+    }
+    lanes.copy_from_slice(&sorted[..lanes.len()]);
+}
+
 /// A lane of a block or of the next.
 #[inline(always)]
 fn place<'a, T>(to: &'a mut Row<T>, next: Option<&'a mut Row<T>>, at: usize) -> Option<&'a mut T> {
@@ -303,6 +329,21 @@ fn place<'a, T>(to: &'a mut Row<T>, next: Option<&'a mut Row<T>>, at: usize) -> 
 mod tests {
     use super::*;
     use crate::math::Rng;
+
+    #[test]
+    fn lanes_are_sorted_by_few_and_by_many_keys() {
+        let mut random = Rng::new(6);
+        for limit in [1, 3, 64, 65, usize::MAX] {
+            for count in [0, 1, 50, BATCH] {
+                let keys: Row<u32> = std::array::from_fn(|_| random.below(limit) as u32);
+                let mut lanes: Vec<u8> = (0..count as u8).filter(|_| random.below(3) > 0).collect();
+                let mut expected = lanes.clone();
+                expected.sort_by_key(|&lane| keys[usize::from(lane)]);
+                sort_lanes(&mut lanes, &keys);
+                assert_eq!(lanes, expected);
+            }
+        }
+    }
 
     #[test]
     fn chosen_lanes_follow_one_another() {

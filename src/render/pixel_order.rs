@@ -14,13 +14,16 @@ pub(super) fn pixel_of_slot(slot: u32) -> [u32; 2] {
 /// The slots of a batch for the tile with this corner: of blocks that reach into the film's area.
 pub(super) fn slots(area: Crop, origin: [u32; 2]) -> impl Iterator<Item = u32> {
     let reaches = move |k: usize, start: u32, length: u32, at: u32| {
-        let block = origin[k] + at / BLOCK_SIZE * BLOCK_SIZE;
+        let block = origin[k] + at;
         block + BLOCK_SIZE > start && block < start + length
     };
-    (0..TILE_SIZE * TILE_SIZE).filter(move |slot| {
-        let [dx, dy] = pixel_of_slot(*slot);
-        reaches(0, area.x, area.width, dx) && reaches(1, area.y, area.height, dy)
-    })
+    let slots_of_block = BLOCK_SIZE * BLOCK_SIZE;
+    (0..TILE_SIZE * TILE_SIZE / slots_of_block)
+        .filter(move |block| {
+            let [dx, dy] = pixel_of_slot(block * slots_of_block);
+            reaches(0, area.x, area.width, dx) && reaches(1, area.y, area.height, dy)
+        })
+        .flat_map(move |block| block * slots_of_block..(block + 1) * slots_of_block)
 }
 
 /// The slot of a pixel within its tile; inverts [`pixel_of_slot`].

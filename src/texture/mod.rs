@@ -121,6 +121,16 @@ impl Texture {
         }
     }
 
+    /// Whether an image is looked up.
+    pub fn has_image(&self) -> bool {
+        match self {
+            Self::Constant(_) | Self::Checker(_) | Self::Attribute(..) => false,
+            Self::Bitmap(_) => true,
+            Self::Product(factors) => factors.iter().any(Self::has_image),
+            Self::Step(of, _) => of.has_image(),
+        }
+    }
+
     /// Whether the value depends on uv.
     pub fn uses_uv(&self) -> bool {
         match self {

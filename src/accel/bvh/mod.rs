@@ -14,7 +14,7 @@ use super::inspect::NodeInfo;
 use super::tree::{Counter, Items, Query, Tree};
 use crate::math::Aabb;
 use binary::BinaryTree;
-pub(super) use build::{Binary, Reference};
+pub(super) use build::{Binary, MAX_LEAF, Reference};
 use lanes::Portable;
 use wide::{ChildKind, STACK, WIDTH, Wide};
 

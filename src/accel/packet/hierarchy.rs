@@ -2,10 +2,11 @@
 
 use super::lanes::BoundingSphere;
 use super::primitives::{Polygon, PrimRecord};
+use super::shapes::PacketShape;
 use crate::accel::bvh::{Binary, Reference};
 use crate::accel::inspect::ItemKind;
 use crate::accel::tree::Items;
-use crate::geometry::{Geometry, Shape, TransformedShape, TrianglePoints};
+use crate::geometry::{Geometry, Shape, TrianglePoints};
 use crate::id::{PrimId, ShapeId};
 use crate::math::{Aabb, DVec3, Vec3};
 
@@ -13,13 +14,12 @@ use crate::math::{Aabb, DVec3, Vec3};
 pub(super) enum Primitive<'g> {
     Triangle(Polygon<3>),
     Quadrilateral(Polygon<4>),
-    Shape(&'g TransformedShape, u32),
+    Shape(PacketShape<'g>),
 }
 
 /// A box with what is inside.
 pub(super) struct Node {
-    pub low: Vec3,
-    pub high: Vec3,
+    pub bounds: Aabb,
     pub content: NodeContent,
 }
 
@@ -39,6 +39,8 @@ pub(super) struct Hierarchy<'g> {
     /// The root first.
     pub nodes: Vec<Node>,
     pub primitives: Vec<Primitive<'g>>,
+    /// Whether some are analytic shapes.
+    pub has_shapes: bool,
     /// By number: triangles of a quadrilateral follow each other.
     pub prims: Vec<PrimRecord>,
 }
@@ -68,11 +70,12 @@ impl<'g> Hierarchy<'g> {
         if references.is_empty() {
             return None;
         }
-        let binary = Binary::new(references, |item| matches!(primitives[item as usize], Primitive::Shape(..)));
+        let binary = Binary::new(references, |_| false);
         let mut primitives: Vec<_> = primitives.into_iter().map(Some).collect();
         let in_order = binary.references.iter().filter_map(|r| primitives[r.item as usize].take()).collect();
         let nodes = nodes(&binary, &sphere);
-        Some(Self { geometry, sphere, nodes, primitives: in_order, prims })
+        let has_shapes = prims.iter().any(|prim| !prim.is_triangle);
+        Some(Self { geometry, sphere, nodes, primitives: in_order, has_shapes, prims })
     }
 
     /// How many polygons and analytic shapes there are.
@@ -90,7 +93,6 @@ impl<'g> Hierarchy<'g> {
 
 /// The nodes of a binary hierarchy, with boxes that rays do not miss by rounding.
 fn nodes(binary: &Binary, sphere: &BoundingSphere) -> Vec<Node> {
-    let margin = Vec3::splat(sphere.rounding());
     let mut nodes = Vec::new();
     let mut open = vec![(0, None)];
     while let Some((source, parent)) = open.pop() {
@@ -115,7 +117,7 @@ fn nodes(binary: &Binary, sphere: &BoundingSphere) -> Vec<Node> {
             open.extend([(low, Some((this as u32, 0u32))), (high, Some((this as u32, 1)))]);
             NodeContent::Nodes { children: [0; 2], axis: axis as u32 }
         };
-        nodes.push(Node { low: from.bounds.min - margin, high: from.bounds.max + margin, content });
+        nodes.push(Node { bounds: sphere.widened(&from.bounds), content });
     }
     nodes
 }
@@ -145,7 +147,7 @@ impl<'g> Builder<'_, 'g> {
         let Some(points) = self.items.triangle(index) else {
             if let Shape::Analytic(placed) = self.geometry.shape(shape) {
                 self.prims.push(PrimRecord::analytic(shape, id));
-                self.add(Primitive::Shape(placed, number), bounds);
+                self.add(Primitive::Shape(PacketShape::new(placed, number, self.sphere.widened(&bounds))), bounds);
             }
             return 1;
         };

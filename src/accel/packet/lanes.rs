@@ -6,7 +6,7 @@ use crate::geometry::{PACKET_SIZE, RayPacket};
 use crate::math::compact::set_bits;
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::rows::Row;
-use crate::math::{RayRows, Vec3};
+use crate::math::{Aabb, RayRows, Vec3};
 
 /// A vector in each lane.
 pub(super) type Vector<S> = [<S as Simd>::f32s; 3];
@@ -42,6 +42,12 @@ impl BoundingSphere {
     pub fn rounding(&self) -> f32 {
         (256.0 * UNIT_ROUNDOFF) as f32 * (self.radius * (1.0 + REACH) + self.center.abs().max_element())
     }
+
+    /// Bounds that rays do not miss by rounding.
+    pub fn widened(&self, bounds: &Aabb) -> Aabb {
+        let margin = Vec3::splat(self.rounding());
+        Aabb { min: bounds.min - margin, max: bounds.max + margin }
+    }
 }
 
 /// The rays of a packet and their closest hits.
@@ -59,13 +65,32 @@ pub(super) struct Packet<S: Simd> {
     /// Minus the origin times the reciprocal.
     scaled_origin: Vector<S>,
     pub t_min: S::f32s,
-    /// Distance of the closest hit, at first the end of the ray; minus infinity in lanes that are not traced, and in
-    /// those found occluded.
+    pub t_max: S::f32s,
+    /// The 1-norm of the direction.
+    pub length: S::f32s,
+    /// The closest hit is not farther than this; at first the end of the ray, minus infinity in lanes that are not
+    /// traced, and in those found occluded.
     pub t: S::f32s,
+    /// The closest hit is not nearer than this: less than `t` only on an analytic shape.
+    pub t_low: S::f32s,
+    /// What is reported as the distance of the closest hit: as `t_low`, but what the shape's interval in `f32` says
+    /// even if the distance has been found in `f64`, so that a result does not depend on what else was near.
+    pub reported: S::f32s,
     /// The number of the primitive hit, or [`NONE`].
     pub prim: S::u32s,
     /// Whether most rays point towards smaller coordinates, by axis.
     pub is_negative: [bool; 3],
+}
+
+/// Hits of a packet's rays on one primitive.
+#[derive(Clone, Copy)]
+pub(super) struct Offer<S: Simd> {
+    /// Distances.
+    pub t: S::f32s,
+    /// What is reported as distances.
+    pub reported: S::f32s,
+    /// The number of the primitive.
+    pub prim: u32,
 }
 
 /// Some of the lanes of a packet, as bits.
@@ -77,17 +102,8 @@ impl LaneSet {
     #[inline(always)]
     pub fn of<S: Simd>(simd: S, mask: S::m32s) -> Self {
         let mut lanes = [0u32; PACKET_SIZE];
-        simd.partial_store_u32s(
-            &mut lanes[..S::F32_LANES],
-            simd.select_u32s(mask, simd.splat_u32s(1), simd.splat_u32s(0)),
-        );
+        store_u32s(simd, simd.select_u32s(mask, simd.splat_u32s(1), simd.splat_u32s(0)), &mut lanes);
         Self((0..PACKET_SIZE).fold(0, |set, lane| set | lanes[lane] << lane))
-    }
-
-    /// Those of the first `count` lanes that are not in the set.
-    #[inline(always)]
-    pub fn complement(self, count: usize) -> Self {
-        Self(!self.0 & ((1u64 << count) - 1) as u32)
     }
 
     #[inline(always)]
@@ -107,10 +123,22 @@ impl LaneSet {
     }
 }
 
-/// As many numbers of a row, from `first` on, as there are lanes.
+/// As many numbers, from `first` on, as there are lanes.
 #[inline(always)]
-fn load<S: Simd>(simd: S, row: &Row, first: usize) -> S::f32s {
-    simd.partial_load_f32s(&row[first..first + S::F32_LANES])
+pub(super) fn load<S: Simd>(_: S, row: &[f32], first: usize) -> S::f32s {
+    S::as_simd_f32s(&row[first..first + S::F32_LANES]).0[0]
+}
+
+/// Writes the numbers of all lanes to the start of `to`, which has room for them.
+#[inline(always)]
+pub(super) fn store_f32s<S: Simd>(_: S, values: S::f32s, to: &mut [f32]) {
+    S::as_mut_simd_f32s(&mut to[..S::F32_LANES]).0[0] = values;
+}
+
+/// As [`store_f32s`].
+#[inline(always)]
+pub(super) fn store_u32s<S: Simd>(_: S, values: S::u32s, to: &mut [u32]) {
+    S::as_mut_simd_u32s(&mut to[..S::F32_LANES]).0[0] = values;
 }
 
 /// Whether any lane is set.
@@ -151,14 +179,28 @@ fn cross<S: Simd>(simd: S, a: Vector<S>, b: Vector<S>) -> Vector<S> {
     ]
 }
 
+/// `a + t b`.
 #[inline(always)]
-fn sum_of_sizes<S: Simd>(simd: S, v: Vector<S>) -> S::f32s {
-    simd.add_f32s(simd.add_f32s(simd.abs_f32s(v[0]), simd.abs_f32s(v[1])), simd.abs_f32s(v[2]))
+pub(super) fn add_scaled<S: Simd>(simd: S, a: Vector<S>, b: Vector<S>, t: S::f32s) -> Vector<S> {
+    [simd.mul_add_f32s(b[0], t, a[0]), simd.mul_add_f32s(b[1], t, a[1]), simd.mul_add_f32s(b[2], t, a[2])]
+}
+
+/// The absolute values of the components.
+#[inline(always)]
+pub(super) fn absolute<S: Simd>(simd: S, v: Vector<S>) -> Vector<S> {
+    [simd.abs_f32s(v[0]), simd.abs_f32s(v[1]), simd.abs_f32s(v[2])]
+}
+
+/// The 1-norm.
+#[inline(always)]
+pub(super) fn absolute_sum<S: Simd>(simd: S, v: Vector<S>) -> S::f32s {
+    let [x, y, z] = absolute(simd, v);
+    simd.add_f32s(simd.add_f32s(x, y), z)
 }
 
 /// Whether `low <= a <= high`; false for a NaN.
 #[inline(always)]
-fn within<S: Simd>(simd: S, a: S::f32s, low: S::f32s, high: S::f32s) -> S::m32s {
+pub(super) fn within<S: Simd>(simd: S, a: S::f32s, low: S::f32s, high: S::f32s) -> S::m32s {
     simd.and_m32s(simd.greater_than_or_equal_f32s(a, low), simd.less_than_or_equal_f32s(a, high))
 }
 
@@ -194,7 +236,7 @@ impl<S: Simd> Packet<S> {
         let (t_min, t_max) = (load(s, &rays.t_min, first), load(s, &rays.t_max, first));
         let (zero, one) = (s.splat_f32s(0.0), s.splat_f32s(1.0));
         let from_center = subtract(s, origin, splat(s, sphere.center));
-        let (distance, length) = (sum_of_sizes(s, from_center), sum_of_sizes(s, direction));
+        let (distance, length) = (absolute_sum(s, from_center), absolute_sum(s, direction));
 
         // Of six products, three have directions and moments of edges (within the radius) and three moments of rays and
         // directions of edges. Each factor was rounded, those of the moment of the ray from a rounded difference: at
@@ -207,9 +249,11 @@ impl<S: Simd> Packet<S> {
         let is_timely = s.and_m32s(within(s, t_min, zero, t_max), within(s, load(s, &rays.time, first), zero, one));
         let is_fit = s.and_m32s(s.and_m32s(is_near, is_usual), is_timely);
         let is_present = s.less_than_u32s(s.partial_load_u32s(&LANES[..S::F32_LANES]), s.splat_u32s(count as u32));
-        let left_out = LaneSet::of(s, is_fit).complement(count.min(S::F32_LANES));
+        let is_left_out = s.and_m32s(is_present, s.not_m32s(is_fit));
+        let left_out = if any(s, is_left_out) { LaneSet::of(s, is_left_out) } else { LaneSet(0) };
 
         let reciprocal = [reciprocal(s, direction[0]), reciprocal(s, direction[1]), reciprocal(s, direction[2])];
+        let t = s.select_f32s(s.and_m32s(is_fit, is_present), t_max, s.splat_f32s(f32::NEG_INFINITY));
         let packet = Self {
             origin,
             direction,
@@ -223,7 +267,11 @@ impl<S: Simd> Packet<S> {
                 s.neg_f32s(s.mul_f32s(origin[2], reciprocal[2])),
             ],
             t_min,
-            t: s.select_f32s(s.and_m32s(is_fit, is_present), t_max, s.splat_f32s(f32::NEG_INFINITY)),
+            t_max,
+            length,
+            t,
+            t_low: t,
+            reported: t,
             prim: s.splat_u32s(NONE),
             is_negative: [
                 most_are_negative(s, direction[0]),
@@ -236,14 +284,14 @@ impl<S: Simd> Packet<S> {
 
     /// The rays that may meet the box before their closest hits.
     #[inline(always)]
-    pub fn enter(&self, simd: S, low: Vec3, high: Vec3) -> S::m32s {
+    pub fn enter(&self, simd: S, bounds: &Aabb) -> S::m32s {
         let s = simd;
         let (mut near, mut far) = (self.t_min, self.t);
         for axis in 0..3 {
             // The error of the sum of two products is that of coordinates, which the boxes allow for.
             let (reciprocal, origin) = (self.reciprocal[axis], self.scaled_origin[axis]);
-            let a = s.mul_add_f32s(s.splat_f32s(low[axis]), reciprocal, origin);
-            let b = s.mul_add_f32s(s.splat_f32s(high[axis]), reciprocal, origin);
+            let a = s.mul_add_f32s(s.splat_f32s(bounds.min[axis]), reciprocal, origin);
+            let b = s.mul_add_f32s(s.splat_f32s(bounds.max[axis]), reciprocal, origin);
             near = s.max_f32s(near, s.min_f32s(a, b));
             far = s.min_f32s(far, s.max_f32s(a, b));
         }
@@ -264,18 +312,65 @@ impl<S: Simd> Packet<S> {
     }
 
     /// Takes hits at `t` on a primitive where they are the closest so far; of hits at one distance, that on the first
-    /// primitive.
+    /// primitive. Where `t` is within the interval of the closest hit, `exact` finds its distance: it takes lanes,
+    /// numbers of primitives and rays. Without analytic `SHAPES` there are no intervals.
     #[inline(always)]
-    pub fn offer<const ANY: bool>(&mut self, simd: S, is_hit: S::m32s, t: S::f32s, prim: u32) {
+    pub fn offer<const ANY: bool, const SHAPES: bool>(
+        &mut self,
+        simd: S,
+        is_hit: S::m32s,
+        hit: Offer<S>,
+        exact: impl Fn(LaneSet, &[u32; PACKET_SIZE], &RayPacket) -> [f32; PACKET_SIZE],
+    ) {
         let s = simd;
+        let Offer { t, reported, prim } = hit;
         let prim = s.splat_u32s(prim);
-        let is_first = s.and_m32s(s.equal_f32s(t, self.t), s.less_than_u32s(prim, self.prim));
-        let is_closer = s.or_m32s(s.less_than_f32s(t, self.t), is_first);
         let is_valid =
             s.and_m32s(s.greater_than_or_equal_f32s(t, self.t_min), s.less_than_f32s(t, s.splat_f32s(f32::INFINITY)));
-        let is_taken = s.and_m32s(s.and_m32s(is_hit, is_valid), is_closer);
-        self.t = s.select_f32s(is_taken, if ANY { s.splat_f32s(f32::NEG_INFINITY) } else { t }, self.t);
+        let is_hit = s.and_m32s(is_hit, is_valid);
+        if SHAPES && !ANY {
+            let is_unclear = s.and_m32s(s.less_than_f32s(self.t_low, self.t), within(s, t, self.t_low, self.t));
+            let is_unclear = s.and_m32s(is_unclear, is_hit);
+            if any(s, is_unclear) {
+                let mut prims = [NONE; PACKET_SIZE];
+                store_u32s(s, self.prim, &mut prims);
+                let rays = RayPacket { t_max: store(s, self.t_max), ..self.rays(s) };
+                let distances = exact(LaneSet::of(s, is_unclear), &prims, &rays);
+                let distances = load(s, &distances, 0);
+                self.t = s.select_f32s(is_unclear, distances, self.t);
+                self.t_low = s.select_f32s(is_unclear, distances, self.t_low);
+            }
+        }
+        let is_first = s.and_m32s(s.equal_f32s(t, self.t), s.less_than_u32s(prim, self.prim));
+        let is_taken = s.and_m32s(is_hit, s.or_m32s(s.less_than_f32s(t, self.t), is_first));
+        let end = if ANY { s.splat_f32s(f32::NEG_INFINITY) } else { t };
+        self.t = s.select_f32s(is_taken, end, self.t);
+        if SHAPES {
+            self.t_low = s.select_f32s(is_taken, end, self.t_low);
+            self.reported = s.select_f32s(is_taken, reported, self.reported);
+        }
         self.prim = s.select_u32s(is_taken, prim, self.prim);
+    }
+
+    /// Takes hits between the distances `low` and `high` on a primitive where they are closer than all so far. The
+    /// result is where that is not clear.
+    #[inline(always)]
+    pub fn offer_interval<const ANY: bool>(
+        &mut self,
+        simd: S,
+        is_hit: S::m32s,
+        [low, high]: [S::f32s; 2],
+        prim: u32,
+    ) -> S::m32s {
+        let s = simd;
+        let is_taken = if ANY { is_hit } else { s.and_m32s(is_hit, s.less_than_f32s(high, self.t_low)) };
+        let is_unclear = s.and_m32s(s.and_m32s(is_hit, s.not_m32s(is_taken)), s.less_than_or_equal_f32s(low, self.t));
+        let end = s.splat_f32s(f32::NEG_INFINITY);
+        self.t = s.select_f32s(is_taken, if ANY { end } else { high }, self.t);
+        self.t_low = s.select_f32s(is_taken, if ANY { end } else { low }, self.t_low);
+        self.reported = s.select_f32s(is_taken, low, self.reported);
+        self.prim = s.select_u32s(is_taken, s.splat_u32s(prim), self.prim);
+        is_unclear
     }
 
     /// The rays up to their closest hits, in rows.
@@ -293,8 +388,8 @@ impl<S: Simd> Packet<S> {
 
 /// The numbers of all lanes, at the start of as many as the largest packet has.
 #[inline(always)]
-fn store<S: Simd>(simd: S, values: S::f32s) -> [f32; PACKET_SIZE] {
+pub(super) fn store<S: Simd>(simd: S, values: S::f32s) -> [f32; PACKET_SIZE] {
     let mut out = [0.0; PACKET_SIZE];
-    simd.partial_store_f32s(&mut out[..S::F32_LANES], values);
+    store_f32s(simd, values, &mut out);
     out
 }

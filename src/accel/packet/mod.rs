@@ -4,6 +4,7 @@
 mod hierarchy;
 mod lanes;
 mod primitives;
+mod shapes;
 #[cfg(test)]
 mod tests;
 mod traverse;
@@ -11,7 +12,7 @@ mod traverse;
 use super::bvh::Bvh;
 use super::inspect::Inspect;
 use super::tree::TwoLevel;
-use super::{Accelerator, BvhOptions, Coherence, HitRows};
+use super::{Accelerator, BvhOptions, Coherence, HitRows, intersect_in_rows};
 use crate::geometry::{Geometry, Hit, Shape};
 use crate::math::rows::BATCH;
 use crate::math::{Aabb, Ray, RayRows};
@@ -68,6 +69,18 @@ impl Accelerator for PacketBvh<'_> {
     fn occluded_rows(&self, rays: &RayRows, count: usize, occluded: &mut [bool; BATCH], coherence: Coherence) {
         let Some(packets) = &self.packets else { return self.single.occluded_rows(rays, count, occluded, coherence) };
         packets.occluded(rays, count.min(BATCH), occluded, |ray| self.single.occluded(ray));
+    }
+
+    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {
+        intersect_in_rows(self, rays, hits, coherence);
+        let Some(packets) = &self.packets else { return };
+        for (ray, hit) in rays.iter().zip(hits) {
+            if let Some(hit) = hit
+                && let Some(t) = packets.exact_distance(hit.shape, ray)
+            {
+                hit.t = t;
+            }
+        }
     }
 
     fn bounds(&self) -> Aabb {

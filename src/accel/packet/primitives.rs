@@ -1,10 +1,9 @@
-//! What packets are intersected with: triangles, pairs of triangles that make a flat quadrilateral, and analytic
-//! shapes.
+//! What packets are intersected with: triangles, and pairs of triangles that make a flat quadrilateral.
 
 use pulp::Simd;
 
-use super::lanes::{BoundingSphere, LaneSet, Packet, any, dot, splat, subtract};
-use crate::geometry::{PACKET_SIZE, RayPacket, TransformedShape, TrianglePoints};
+use super::lanes::{BoundingSphere, LaneSet, Packet, any, dot, load, splat, subtract};
+use crate::geometry::{PACKET_SIZE, RayPacket, TrianglePoints};
 use crate::id::{PrimId, ShapeId};
 use crate::math::{DVec3, Vec3};
 
@@ -45,14 +44,14 @@ impl<const N: usize> Polygon<N> {
 
     /// Intersects the rays of a packet with the polygon. Those that pass so close to an edge that rounding could
     /// decide, or so flat that it decides the distance, are intersected by `exact`, which takes lanes and gives
-    /// distances, negative on a miss.
+    /// distances, negative on a miss. The result is who hits it, and where.
     #[inline(always)]
-    pub fn intersect<S: Simd, const ANY: bool>(
+    pub fn intersect<S: Simd>(
         &self,
         simd: S,
-        packet: &mut Packet<S>,
+        packet: &Packet<S>,
         exact: impl Fn(LaneSet, &RayPacket) -> [f32; PACKET_SIZE],
-    ) {
+    ) -> Option<(S::m32s, S::f32s)> {
         let s = simd;
         let mut lowest = packet.side(s, self.edges[0].direction, self.edges[0].moment);
         let mut highest = lowest;
@@ -65,7 +64,7 @@ impl<const N: usize> Polygon<N> {
         let may_hit =
             s.or_m32s(s.greater_than_or_equal_f32s(lowest, minus_error), s.less_than_or_equal_f32s(highest, error));
         if !any(s, may_hit) {
-            return;
+            return None;
         }
         // Relative to the corner, so that rays which start close to the plane find themselves on their side of it.
         let normal = splat(s, self.normal);
@@ -77,10 +76,10 @@ impl<const N: usize> Polygon<N> {
         let is_undecided = s.and_m32s(s.and_m32s(may_hit, s.not_m32s(is_hit)), packet.is_open(s));
         if any(s, is_undecided) {
             let distances = exact(LaneSet::of(s, is_undecided), &packet.rays(s));
-            t = s.select_f32s(is_undecided, s.partial_load_f32s(&distances[..S::F32_LANES]), t);
+            t = s.select_f32s(is_undecided, load(s, &distances, 0), t);
             is_hit = may_hit;
         }
-        packet.offer::<ANY>(s, is_hit, t, self.prim);
+        Some((is_hit, t))
     }
 }
 
@@ -97,12 +96,15 @@ pub(super) struct PrimRecord {
     /// next primitive is hit.
     distance: f32,
     inward: Vec3,
+    /// Whether it is a triangle.
+    pub is_triangle: bool,
 }
 
 impl PrimRecord {
     /// An analytic shape.
     pub fn analytic(shape: ShapeId, id: PrimId) -> Self {
-        Self { shape, id, corner: Vec3::ZERO, du: Vec3::ZERO, dv: Vec3::ZERO, distance: 0.0, inward: Vec3::ZERO }
+        let zero = Vec3::ZERO;
+        Self { shape, id, corner: zero, du: zero, dv: zero, distance: 0.0, inward: zero, is_triangle: false }
     }
 
     /// A triangle.
@@ -110,7 +112,7 @@ impl PrimRecord {
         let n = points.cross();
         let [a, b, c] = [points.a, points.b, points.c].map(Vec3::as_dvec3);
         let (du, dv) = ((c - a).cross(n) / n.length_squared(), n.cross(b - a) / n.length_squared());
-        Self { corner: points.a, du: du.as_vec3(), dv: dv.as_vec3(), ..Self::analytic(shape, id) }
+        Self { corner: points.a, du: du.as_vec3(), dv: dv.as_vec3(), is_triangle: true, ..Self::analytic(shape, id) }
     }
 
     /// The first of two triangles that share an edge; `inside` is its corner that the other one has not.
@@ -134,37 +136,4 @@ impl PrimRecord {
         let u = p.dot(self.du).clamp(0.0, 1.0);
         [u, p.dot(self.dv).clamp(0.0, 1.0 - u)]
     }
-}
-
-/// Fewer rays are intersected with analytic shapes one by one.
-const MIN_PACKET_RAYS: u32 = 3;
-
-/// Intersects some rays of a packet with an analytic shape.
-#[inline(always)]
-pub(super) fn intersect_shape<S: Simd, const ANY: bool>(
-    simd: S,
-    placed: &TransformedShape,
-    prim: u32,
-    lanes: LaneSet,
-    packet: &mut Packet<S>,
-) {
-    let distances = distances(placed, lanes, &packet.rays(simd));
-    let t = simd.partial_load_f32s(&distances[..S::F32_LANES]);
-    packet.offer::<ANY>(simd, simd.greater_than_or_equal_f32s(t, simd.splat_f32s(0.0)), t, prim);
-}
-
-/// The distances at which some rays hit a shape; negative on a miss, and for the others.
-#[inline(never)]
-fn distances(placed: &TransformedShape, lanes: LaneSet, rays: &RayPacket) -> [f32; PACKET_SIZE] {
-    let mut distances = [-1.0; PACKET_SIZE];
-    let alone = |lane: usize| placed.intersect(&rays.get(lane)).map_or(-1.0, |hit| hit.t as f32);
-    if lanes.count() < MIN_PACKET_RAYS {
-        lanes.lanes().for_each(|lane| distances[lane] = alone(lane));
-    } else {
-        let hits = placed.intersect_packet(rays);
-        lanes
-            .lanes()
-            .for_each(|lane| distances[lane] = if hits.is_undecided[lane] == 0 { hits.t[lane] } else { alone(lane) });
-    }
-    distances
 }

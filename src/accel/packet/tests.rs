@@ -7,7 +7,7 @@ use super::traverse::{Closest, Occluded};
 use super::*;
 use crate::accel::LinearAccel;
 use crate::accel::tree::testing::{Sequence, mesh_geometry};
-use crate::geometry::{Analytic, Disk, Mesh, Sphere, TransformedShape, TrianglePoints};
+use crate::geometry::{Analytic, Disk, Frustum, Mesh, Quad, Sphere, TransformedShape, TrianglePoints};
 use crate::id::ShapeId;
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{DAffine3, DVec3, Transform, Vec3};
@@ -47,9 +47,21 @@ fn geometries(random: &mut Sequence) -> Vec<Geometry> {
     all.extend([1, 7, 60].map(|count| mesh_geometry(&soup(random, count))));
     let mut mixed = mesh_geometry(&cube(1));
     let sphere = |radius: f64| Analytic::Sphere(Sphere::new(radius, -radius, radius, TAU).unwrap());
-    let shapes = [sphere(0.5), Analytic::Disk(Disk::new(0.7, 0.0, TAU).unwrap()), sphere(0.2), sphere(0.1)];
+    let disk = |radius: f64, hole: f64| Analytic::Disk(Disk::new(radius, hole, TAU).unwrap());
+    let quad = Quad::new(DVec3::new(-0.4, -0.3, 0.1), DVec3::X * 0.8, DVec3::new(0.1, 0.6, 0.2)).unwrap();
+    let shapes = [
+        sphere(0.5),
+        disk(0.7, 0.0),
+        sphere(0.2),
+        sphere(0.1),
+        Analytic::Quad(quad),
+        disk(0.4, 0.2),
+        Analytic::Frustum(Frustum::cylinder(0.2, 0.6, TAU).unwrap()),
+        Analytic::Frustum(Frustum::new(0.3, 0.0, 0.5, 4.0).unwrap()),
+    ];
     for (i, shape) in shapes.into_iter().enumerate() {
-        let place = DAffine3::from_translation(DVec3::new(0.3 * i as f64 - 0.5, 0.2, 0.4 - 0.3 * i as f64));
+        // Some of them pass through each other, and the last touch.
+        let place = DAffine3::from_translation(DVec3::new(0.3 * (i % 4) as f64 - 0.5, 0.2, 0.4 - 0.3 * (i % 4) as f64));
         mixed.world.push(ShapeId::new(mixed.shapes.len()));
         mixed.shapes.push(Shape::Analytic(TransformedShape::new(shape, Transform::new(place).unwrap())));
     }

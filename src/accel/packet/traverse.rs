@@ -5,10 +5,14 @@ use pulp::x86::{V3, V4};
 use pulp::{Scalar, Simd, WithSimd};
 
 use super::hierarchy::{Hierarchy, NodeContent, Primitive, STACK};
-use super::lanes::{LaneSet, NONE, Packet, any};
-use super::primitives::{PrimRecord, intersect_shape};
+use super::lanes::{LaneSet, NONE, Offer, Packet, any, load, store_f32s, store_u32s};
+use super::primitives::PrimRecord;
+use super::shapes::{IntervalHits, PacketShape};
 use crate::accel::HitRows;
-use crate::geometry::{Hit, PACKET_SIZE, RayPacket, Shape, TrianglePoints, TriangleRay};
+use crate::accel::bvh::MAX_LEAF;
+use crate::geometry::{Hit, PACKET_SIZE, RayPacket, Shape, TransformedShape, TrianglePoints, TriangleRay};
+use crate::id::ShapeId;
+use crate::math::compact::set_bits;
 use crate::math::rows::BATCH;
 use crate::math::{Ray, RayRows};
 
@@ -26,10 +30,13 @@ impl Hierarchy<'_> {
     /// Writes the hit of a ray, of which the distance is known, on the primitive with a number.
     #[inline(always)]
     fn complete(&self, number: u32, rays: &RayRows, lane: usize, hits: &mut HitRows) {
-        let p = rays.origin.get(lane) + rays.direction.get(lane) * hits.t[lane];
-        let number = number + u32::from(self.prims[number as usize].is_beyond(p));
-        let prim = &self.prims[number as usize];
-        [hits.u[lane], hits.v[lane]] = prim.barycentric(p);
+        let mut prim = &self.prims[number as usize];
+        (hits.u[lane], hits.v[lane]) = (0.0, 0.0);
+        if prim.is_triangle {
+            let p = rays.origin.get(lane) + rays.direction.get(lane) * hits.t[lane];
+            prim = &self.prims[number as usize + usize::from(prim.is_beyond(p))];
+            [hits.u[lane], hits.v[lane]] = prim.barycentric(p);
+        }
         (hits.shape[lane], hits.prim[lane], hits.instance[lane]) = (prim.shape.0, prim.id.0, Hit::NO_INSTANCE.0);
     }
 
@@ -55,13 +62,14 @@ impl Hierarchy<'_> {
         }
     }
 
+    /// Finds the closest hits of a packet, or `ANY` hits; `SHAPES` says whether there are analytic shapes.
     #[inline(always)]
-    fn traverse<S: Simd, const ANY: bool>(&self, simd: S, packet: &mut Packet<S>) {
+    fn traverse<S: Simd, const ANY: bool, const SHAPES: bool>(&self, simd: S, packet: &mut Packet<S>) {
         let mut stack = ArrayVec::<u32, STACK>::new();
         let mut index = 0;
         loop {
             let node = &self.nodes[index as usize];
-            let entering = packet.enter(simd, node.low, node.high);
+            let entering = packet.enter(simd, &node.bounds);
             if any(simd, entering) {
                 match node.content {
                     NodeContent::Nodes { children, axis } => {
@@ -71,22 +79,14 @@ impl Hierarchy<'_> {
                         continue;
                     }
                     NodeContent::Primitives { first, count } => {
-                        for primitive in &self.primitives[first as usize..(first + count) as usize] {
-                            match primitive {
-                                Primitive::Triangle(polygon) => {
-                                    polygon.intersect::<S, ANY>(simd, packet, |lanes, rays| {
-                                        self.exact(polygon.prim, 1, lanes, rays)
-                                    });
-                                }
-                                Primitive::Quadrilateral(polygon) => {
-                                    polygon.intersect::<S, ANY>(simd, packet, |lanes, rays| {
-                                        self.exact(polygon.prim, 2, lanes, rays)
-                                    });
-                                }
-                                Primitive::Shape(placed, prim) => {
-                                    intersect_shape::<S, ANY>(simd, placed, *prim, LaneSet::of(simd, entering), packet);
-                                }
-                            }
+                        let run = &self.primitives[first as usize..(first + count) as usize];
+                        if SHAPES {
+                            self.intersect_run::<S, ANY>(simd, run, entering, packet);
+                        } else {
+                            run.iter().for_each(
+                                #[inline(always)]
+                                |primitive| self.intersect_polygon::<S, ANY, false>(simd, primitive, packet),
+                            );
                         }
                     }
                 }
@@ -95,6 +95,119 @@ impl Hierarchy<'_> {
             index = next;
         }
     }
+
+    /// Intersects the rays that enter a leaf with its primitives.
+    #[inline(always)]
+    fn intersect_run<S: Simd, const ANY: bool>(
+        &self,
+        simd: S,
+        run: &[Primitive<'_>],
+        entering: S::m32s,
+        packet: &mut Packet<S>,
+    ) {
+        // First the boxes of shapes: side by side they take less time than one after the other.
+        let mut lanes = [entering; MAX_LEAF];
+        let mut entered = 0;
+        for (i, (primitive, lanes)) in run.iter().zip(&mut lanes).enumerate() {
+            if let (Primitive::Shape(shape), 2..) = (primitive, run.len()) {
+                *lanes = packet.enter(simd, &shape.bounds);
+            }
+            entered |= u32::from(any(simd, *lanes)) << i;
+        }
+        for i in set_bits(entered) {
+            if let Primitive::Shape(shape) = &run[i] {
+                self.intersect_shape::<S, ANY>(simd, shape, lanes[i % MAX_LEAF], packet);
+            } else {
+                self.intersect_polygon::<S, ANY, true>(simd, &run[i], packet);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn intersect_polygon<S: Simd, const ANY: bool, const SHAPES: bool>(
+        &self,
+        simd: S,
+        primitive: &Primitive<'_>,
+        packet: &mut Packet<S>,
+    ) {
+        let (found, prim) = match primitive {
+            Primitive::Triangle(polygon) => {
+                let exact = |lanes, rays: &RayPacket| self.exact(polygon.prim, 1, lanes, rays);
+                (polygon.intersect(simd, packet, exact), polygon.prim)
+            }
+            Primitive::Quadrilateral(polygon) => {
+                let exact = |lanes, rays: &RayPacket| self.exact(polygon.prim, 2, lanes, rays);
+                (polygon.intersect(simd, packet, exact), polygon.prim)
+            }
+            Primitive::Shape(_) => return,
+        };
+        if let Some((is_hit, t)) = found {
+            let exact = |lanes, prims: &[u32; PACKET_SIZE], rays: &RayPacket| self.exact_distances(lanes, prims, rays);
+            packet.offer::<ANY, SHAPES>(simd, is_hit, Offer { t, reported: t, prim }, exact);
+        }
+    }
+
+    #[inline(always)]
+    fn intersect_shape<S: Simd, const ANY: bool>(
+        &self,
+        simd: S,
+        shape: &PacketShape<'_>,
+        entering: S::m32s,
+        packet: &mut Packet<S>,
+    ) {
+        let s = simd;
+        let lanes = s.and_m32s(entering, packet.is_open(s));
+        let IntervalHits { low, high, is_hit, may_hit } = shape.intersect::<S, ANY>(s, packet, lanes);
+        let is_unclear = packet.offer_interval::<ANY>(s, is_hit, [low, high], shape.prim);
+        let undecided = s.and_m32s(lanes, s.or_m32s(may_hit, is_unclear));
+        if any(s, undecided) {
+            let distances = distances(shape.placed, LaneSet::of(s, undecided), &packet.rays(s));
+            let t = load(s, &distances, 0);
+            let is_hit = s.greater_than_or_equal_f32s(t, s.splat_f32s(0.0));
+            let hit = Offer { t, reported: s.select_f32s(is_unclear, low, t), prim: shape.prim };
+            packet.offer::<ANY, true>(s, is_hit, hit, |lanes, prims, rays| self.exact_distances(lanes, prims, rays));
+        }
+    }
+
+    /// The distances in `f64` at which some of the rays hit the analytic shapes with these numbers.
+    #[cold]
+    #[inline(never)]
+    fn exact_distances(&self, lanes: LaneSet, prims: &[u32; PACKET_SIZE], rays: &RayPacket) -> [f32; PACKET_SIZE] {
+        let mut distances = [f32::INFINITY; PACKET_SIZE];
+        for lane in lanes.lanes() {
+            if let Some(t) = self.exact_distance(self.prims[prims[lane] as usize].shape, &rays.get(lane)) {
+                distances[lane] = t;
+            }
+        }
+        distances
+    }
+
+    /// The distance in `f64` at which a ray hits an analytic shape.
+    pub fn exact_distance(&self, shape: ShapeId, ray: &Ray) -> Option<f32> {
+        match self.geometry.shape(shape) {
+            Shape::Analytic(placed) => placed.intersect(ray).map(|hit| hit.t as f32),
+            Shape::Mesh(_) => None,
+        }
+    }
+}
+
+/// Fewer rays are intersected with analytic shapes one by one.
+const MIN_PACKET_RAYS: u32 = 3;
+
+/// The distances in `f64` at which some rays hit a shape; negative on a miss, and for the others.
+#[inline(never)]
+fn distances(placed: &TransformedShape, lanes: LaneSet, rays: &RayPacket) -> [f32; PACKET_SIZE] {
+    let mut distances = [-1.0; PACKET_SIZE];
+    let alone = |lane: usize| placed.intersect(&rays.get(lane)).map_or(-1.0, |hit| hit.t as f32);
+    if lanes.count() < MIN_PACKET_RAYS {
+        lanes.lanes().for_each(|lane| distances[lane] = alone(lane));
+    } else {
+        let hits = placed.intersect_packet(rays);
+        lanes
+            .lanes()
+            .for_each(|lane| distances[lane] = if hits.is_undecided[lane] == 0 { hits.t[lane] } else { alone(lane) });
+    }
+    distances
 }
 
 fn run<K: WithSimd>(kernel: K) -> K::Output {
@@ -123,10 +236,15 @@ impl<F: Fn(&Ray) -> Option<Hit>> WithSimd for Closest<'_, F> {
         let Self { hierarchy, rays, count, hits, alone } = self;
         for first in (0..count).step_by(S::F32_LANES) {
             let (mut packet, left_out) = Packet::new(simd, &hierarchy.sphere, rays, first, count - first);
-            hierarchy.traverse::<S, false>(simd, &mut packet);
+            if hierarchy.has_shapes {
+                hierarchy.traverse::<S, false, true>(simd, &mut packet);
+            } else {
+                hierarchy.traverse::<S, false, false>(simd, &mut packet);
+            }
             let lanes = first..first + S::F32_LANES;
-            simd.partial_store_f32s(&mut hits.t[lanes.clone()], packet.t);
-            simd.partial_store_u32s(&mut hits.shape[lanes.clone()], packet.prim);
+            let reported = if hierarchy.has_shapes { packet.reported } else { packet.t };
+            store_f32s(simd, reported, &mut hits.t[first..]);
+            store_u32s(simd, packet.prim, &mut hits.shape[first..]);
             for lane in lanes {
                 let number = hits.shape[lane];
                 if number != NONE {
@@ -156,7 +274,11 @@ impl<F: Fn(&Ray) -> bool> WithSimd for Occluded<'_, F> {
         let Self { hierarchy, rays, count, occluded, alone } = self;
         for first in (0..count).step_by(S::F32_LANES) {
             let (mut packet, left_out) = Packet::new(simd, &hierarchy.sphere, rays, first, count - first);
-            hierarchy.traverse::<S, true>(simd, &mut packet);
+            if hierarchy.has_shapes {
+                hierarchy.traverse::<S, true, true>(simd, &mut packet);
+            } else {
+                hierarchy.traverse::<S, true, false>(simd, &mut packet);
+            }
             let is_hit = LaneSet::of(simd, simd.less_than_u32s(packet.prim, simd.splat_u32s(NONE)));
             for (lane, occluded) in occluded[first..count].iter_mut().take(S::F32_LANES).enumerate() {
                 *occluded = is_hit.contains(lane);

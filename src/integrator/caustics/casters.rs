@@ -1,11 +1,11 @@
 //! The mirrors and clear glass of a scene, where caustics start.
 
 use crate::bsdf::BsdfFlags;
-use crate::geometry::{Geometry, Hit, Shape};
+use crate::geometry::{Geometry, Hit, Shape, SpawnPoint, SurfacePoint};
 use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::integrator::world::has_part;
-use crate::light::placed_area;
-use crate::math::{DVec3, Vec3};
+use crate::light::{placed_area, triangle_error};
+use crate::math::Vec3;
 use crate::sampling::{AliasTable, warp};
 use crate::scene::Scene;
 
@@ -25,12 +25,8 @@ pub struct CausticCasters {
 pub struct CausticPoint {
     /// The shape.
     pub shape: ShapeId,
-    /// Its primitive.
-    pub prim: PrimId,
     /// The point.
-    pub p: DVec3,
-    /// Unit geometric normal.
-    pub n: Vec3,
+    pub point: SpawnPoint,
     /// Density per area.
     pub pdf_area: f64,
 }
@@ -76,11 +72,13 @@ impl CausticCasters {
                 let [b, c] = warp::uniform_triangle([v, w]);
                 let [a, edge_u, edge_v] = [points.a, points.b - points.a, points.c - points.a].map(Vec3::as_dvec3);
                 let (p, n) = (a + edge_u * b + edge_v * c, points.cross().normalize().as_vec3());
-                CausticPoint { shape, prim, p, n, pdf_area: pmf / points.area() }
+                let point = SpawnPoint { p, n, error: triangle_error(&points) };
+                CausticPoint { shape, point, pdf_area: pmf / points.area() }
             }
             Shape::Analytic(placed) => {
-                let point = placed.sample_area([v, w]);
-                CausticPoint { shape, prim, p: point.p, n: point.n, pdf_area: pmf * point.pdf_area }
+                let SurfacePoint { p, n, pdf_area } = placed.sample_area([v, w]);
+                let point = SpawnPoint { p, n, error: placed.error() };
+                CausticPoint { shape, point, pdf_area: pmf * pdf_area }
             }
         }
     }

@@ -7,6 +7,7 @@ use crate::bsdf::{Bsdf, BsdfQueryRows, Lambert};
 use crate::color::Rgb;
 use crate::id::ShapeId;
 use crate::material::Material;
+use crate::math::compact::sort_lanes;
 use crate::math::rows::{BATCH, Row};
 use crate::scene::Scene;
 use crate::texture::Footprint;
@@ -111,6 +112,10 @@ pub(super) fn evaluate(context: &Context, wave: &mut Wave, block: usize) {
 /// together.
 fn find_footprints(context: &Context, wave: &mut Wave, block: usize) {
     let Wave { vertices, rays, hits, cones, .. } = wave;
+    if !context.scene.features.image_textures {
+        vertices.rows.texture_area = [0.0; BATCH];
+        return;
+    }
     for i in 0..vertices.textured.len() {
         let lane = usize::from(vertices.textured[i]);
         let path = vertices.path(lane);
@@ -175,7 +180,7 @@ fn flags(bsdf: &Bsdf) -> u32 {
 /// Sorts the vertices that are not diffuse by their groups.
 pub(super) fn sort_by_bsdf(vertices: &mut Vertices) {
     let Vertices { non_diffuse, bsdfs, .. } = vertices;
-    non_diffuse.sort_unstable_by_key(|&lane| u64::from(bsdfs.groups[usize::from(lane)]) << 8 | u64::from(lane));
+    sort_lanes(non_diffuse, &bsdfs.groups);
 }
 
 /// Replaces the BSDFs of boundaries between media, and of rough surfaces under path space regularization.

@@ -24,7 +24,9 @@ pub(super) struct MissScratch {
 pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Output) {
     let Wave { vertices, paths, rays, light_aovs, miss, caustics, .. } = wave;
     let (paths, rays, misses) = (&paths[block], &rays[block], &vertices.misses);
-    if misses.is_empty() {
+    let is_black = context.scene.lights.at_infinity().is_empty();
+    let needs_aovs = context.config.needs_light_aovs() || context.needs_surface_aovs();
+    if misses.is_empty() || (is_black && context.bounce > 0 && !needs_aovs) {
         return;
     }
     let MissScratch { directions, evals, environment } = miss;

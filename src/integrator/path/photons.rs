@@ -32,7 +32,7 @@ pub(super) struct PhotonState {
     start: CausticPoint,
 }
 
-/// A point counts as the start of a photon up to this part of the distance from the light.
+/// A point counts as the start of a photon up to this part of its ray's length and of its distance from the origin.
 const START_TOLERANCE: f64 = 1e-5;
 
 /// Appends the photons that arrive.
@@ -114,12 +114,12 @@ fn emitted(context: &Context, source: &Source, index: u32) -> Option<(CameraSamp
     let (scene, sampler, seed) = (context.scene, &context.config.sampler, source.range.seed);
     let [a, b, c, _] = sampler.sample_4d(seed, index, dimensions::CAMERA);
     let start = source.casters.sample(&scene.geometry, [a, b, c]);
-    let from = LightSampleContext { p: start.p, n: Vec3::ZERO };
+    let from = LightSampleContext { p: start.point.p, n: Vec3::ZERO };
     let [a, b, u, v] = sampler.sample_4d(seed, index, dimensions::light(0));
     let choice = scene.lights.choose(&from, [a, b], context.compensation)?;
     let light = scene.lights.get(choice.id);
-    let sample = light.sample(&scene.geometry, &scene.textures, start.p, [u, v], context.compensation)?;
-    let cos = sample.wi.dot(start.n).abs();
+    let sample = light.sample(&scene.geometry, &scene.textures, start.point.p, [u, v], context.compensation)?;
+    let cos = sample.wi.dot(start.point.n).abs();
     let light_pdf = choice.pmf * sample.pdf;
     let power = sample.radiance * (cos / (light_pdf * start.pdf_area as f32));
     // Paths never meet a delta light: its photons have the whole weight.
@@ -129,13 +129,18 @@ fn emitted(context: &Context, source: &Source, index: u32) -> Option<(CameraSamp
     if power.is_black() || !power.is_finite() || density.is_nan() || (density.is_infinite() && !is_only_way) {
         return None;
     }
-    let ray = match sample.target {
-        ShadowTarget::Point(target) => target.ray_along(-sample.wi),
+    let (shadow_ray, distance) = match sample.target {
+        ShadowTarget::Point(target) => (start.point.ray_to(&target), (target.p - start.point.p).length()),
         ShadowTarget::Infinity => {
-            let distance = 2.0 * context.world.accel.bounds().size().length();
-            Ray::new((start.p + sample.wi.as_dvec3() * f64::from(distance)).as_vec3(), -sample.wi)
+            (start.point.ray_along(sample.wi), f64::from(context.world.accel.bounds().size().length()))
         }
     };
+    if context.world.accel.occluded(&shadow_ray) {
+        return None;
+    }
+    // The ray starts half-way, where nothing is in between.
+    let origin = start.point.p + sample.wi.as_dvec3() * (0.5 * distance);
+    let ray = Ray::new(origin.as_vec3(), -sample.wi);
     Some((CameraSample { ray, seed, sample: index }, PhotonState { density, light: choice.id, start }, power))
 }
 
@@ -144,12 +149,11 @@ fn keep_starts(wave: &mut Wave, block: usize) {
     let Wave { vertices, photons, rays, .. } = wave;
     for lane in 0..vertices.count {
         let path = vertices.path(lane);
-        let CausticPoint { shape, prim, p, .. } = photons[block * BATCH + path].start;
+        let CausticPoint { shape, point, .. } = photons[block * BATCH + path].start;
         let (rows, at) = (&mut vertices.rows, vertices.points.p.get(lane));
-        let reach = (p - rays[block].origin.get(path).as_dvec3()).length();
-        let is_start =
-            (rows.shape[lane], rows.prim[lane]) == (shape.0, prim.0) && (at - p).length() < START_TOLERANCE * reach;
-        if !is_start {
+        let origin = rays[block].origin.get(path).as_dvec3();
+        let tolerance = START_TOLERANCE * ((point.p - origin).length() + point.p.length());
+        if rows.shape[lane] != shape.0 || (at - point.p).length() > tolerance {
             rows.flags[lane] |= vertex_flags::MISS;
             rows.throughput.set(lane, Rgb::BLACK);
         }

@@ -8,7 +8,7 @@ use crate::color::Rgb;
 use crate::geometry::{Hit, Shape, TrianglePoints, interpolated_normal, interpolated_uv, uv_area, uv_density};
 use crate::id::ShapeId;
 use crate::integrator::shading::{adapted_normal, is_consistent};
-use crate::math::compact::{Compaction, collect_lanes};
+use crate::math::compact::{Compaction, collect_lanes, sort_lanes};
 use crate::math::rows::{BATCH, Element, Row, Vec3Rows};
 use crate::math::vectorize::vectorize;
 use crate::math::{Frame, RayRows, Vec2};
@@ -109,7 +109,7 @@ fn resolve_analytic(context: &Context, vertices: &mut Vertices, rays: &RayRows, 
         let is_in_world = rows.is_unresolved[lane] != 0 && rows.instance[lane] == Hit::NO_INSTANCE.0;
         is_in_world && context.world.resolves_in_rows(ShapeId(rows.shape[lane]))
     });
-    lanes.sort_unstable_by_key(|&lane| u64::from(rows.shape[usize::from(lane)]) << 8 | u64::from(lane));
+    sort_lanes(lanes, &rows.shape);
     for lanes in lanes.chunk_by(|&a, &b| rows.shape[usize::from(a)] == rows.shape[usize::from(b)]) {
         let Shape::Analytic(placed) = context.scene.geometry.shape(ShapeId(rows.shape[usize::from(lanes[0])])) else {
             continue;
@@ -119,7 +119,9 @@ fn resolve_analytic(context: &Context, vertices: &mut Vertices, rays: &RayRows, 
         }
         for (i, &lane) in lanes.iter().enumerate() {
             let path = rows.path[usize::from(lane)] as usize;
-            gathered.set(i, &rays.get(path));
+            gathered.origin.set(i, rays.origin.get(path));
+            gathered.direction.set(i, rays.direction.get(path));
+            gathered.t_min[i] = rays.t_min[path];
             t[i] = hits.t[path];
         }
         placed.resolve_rows(gathered, t, lanes.len(), found, normals);

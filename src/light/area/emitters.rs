@@ -5,6 +5,7 @@ use crate::geometry::{Geometry, Shape, WorldSampleRows};
 use crate::id::LightId;
 use crate::light::{Light, LightContext, LightQueries, LightSample};
 use crate::math::DVec3;
+use crate::math::compact::sort_lanes;
 use crate::math::rows::{BATCH, Row, pair, soa};
 use crate::math::vectorize::vectorize;
 
@@ -22,8 +23,9 @@ soa! {
 
 /// Vertices that sample spheres and other analytic shapes, at most [`BATCH`].
 pub(in crate::light) struct EmitterQueue {
-    /// The light and the vertex of each.
-    entries: Vec<(LightId, usize)>,
+    lanes: Vec<u8>,
+    /// Of each vertex, the light.
+    lights: Row<u32>,
     rows: EmitterRows,
 }
 
@@ -38,7 +40,7 @@ impl Default for EmitterQueue {
     fn default() -> Self {
         let rows =
             EmitterRows { u: [[0.0; BATCH]; 2], views: ViewRows::default(), samples: WorldSampleRows::default() };
-        Self { entries: Vec::with_capacity(BATCH), rows }
+        Self { lanes: Vec::with_capacity(BATCH), lights: [0; BATCH], rows }
     }
 }
 
@@ -48,7 +50,7 @@ const MIN_LANES: usize = 3;
 impl EmitterQueue {
     /// Empties the queue.
     pub fn clear(&mut self) {
-        self.entries.clear();
+        self.lanes.clear();
     }
 
     /// Queues the sample of a light for the vertex `lane`; `false` if the light is not sampled here.
@@ -59,25 +61,26 @@ impl EmitterQueue {
         {
             return false;
         }
-        self.entries.push((id, lane));
+        self.lanes.push(lane as u8);
+        self.lights[lane] = id.0;
         true
     }
 
     /// Samples all lights; `set` takes each sample with its vertex.
     pub fn sample(&mut self, context: &LightContext, queries: &LightQueries, mut set: impl FnMut(usize, &LightSample)) {
-        let Self { entries, rows } = self;
-        entries.sort_unstable_by_key(|&(id, lane)| u64::from(id.0) << 8 | lane as u64);
-        for group in entries.chunk_by(|a, b| a.0 == b.0) {
-            let Light::Area(light) = context.lights.get(group[0].0) else { continue };
+        let Self { lanes, lights, rows } = self;
+        sort_lanes(lanes, lights);
+        for group in lanes.chunk_by(|&a, &b| lights[usize::from(a)] == lights[usize::from(b)]) {
+            let Light::Area(light) = context.lights.get(LightId(lights[usize::from(group[0])])) else { continue };
             let is_in_rows = group.len() >= MIN_LANES && {
-                for (i, &(_, lane)) in group.iter().enumerate() {
-                    let (p, [s, t]) = queries.get(lane);
+                for (i, &lane) in group.iter().enumerate() {
+                    let (p, [s, t]) = queries.get(usize::from(lane));
                     rows.views.p.set(i, p);
                     (rows.u[0][i], rows.u[1][i]) = (s, t);
                 }
                 rows.sample(light, context.geometry, group.len())
             };
-            for (i, &(_, lane)) in group.iter().enumerate() {
+            for (i, lane) in group.iter().map(|&lane| usize::from(lane)).enumerate() {
                 let (p, u) = queries.get(lane);
                 let sample = if is_in_rows {
                     sample_of_row(light, &rows.views, i)

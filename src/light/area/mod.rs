@@ -13,7 +13,8 @@ pub(super) use emitters::EmitterQueue;
 use parallelogram::ParallelogramEmitter;
 pub(super) use queue::AreaQueue;
 use sphere::SphereEmitter;
-use triangle::{TriangleEmitter, triangle_error};
+use triangle::TriangleEmitter;
+pub(crate) use triangle::triangle_error;
 
 use super::bounds::{EmissionCone, LightBounds, to_positive};
 use super::{LightSample, ShadowTarget};

@@ -21,7 +21,7 @@ pub(super) struct TriangleEmitter {
 /// The error that [`SurfaceInteraction::error`](crate::geometry::SurfaceInteraction::error) states for a hit of a
 /// triangle, for all its points: four units of roundoff of its extent. More for a sliver, since nobody confirms that a
 /// shadow ray ends before it.
-pub(super) fn triangle_error(points: &TrianglePoints) -> f32 {
+pub(crate) fn triangle_error(points: &TrianglePoints) -> f32 {
     let error = 4.0 * UNIT_ROUNDOFF as f32 * points.bounds().size().max_element();
     if points.is_sliver() { error * 0.5 * points.flatness() as f32 } else { error }
 }
