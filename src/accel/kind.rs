@@ -52,7 +52,7 @@ impl AccelKind {
 
     /// Every kind and every option, with what it is.
     pub const CHOICES: &'static [(&'static str, &'static str)] = &[
-        ("auto", "packets where a scene has at most 40 primitives, all at rest and without holes; else embree"),
+        ("auto", "packets for at most 40 primitives beside spheres and cylinders, at rest, without holes; else embree"),
         ("embree", "Embree: fastest for large scenes; build quality medium, robust"),
         ("embree:low", "built faster, traced slower"),
         ("embree:high", "spatial splits: built slower, traced faster"),

@@ -13,13 +13,16 @@ use super::bvh::Bvh;
 use super::inspect::Inspect;
 use super::tree::TwoLevel;
 use super::{Accelerator, BvhOptions, Coherence, HitRows, intersect_in_rows};
-use crate::geometry::{Geometry, Hit, Shape};
+use crate::geometry::{Analytic, Geometry, Hit, Shape};
 use crate::math::rows::BATCH;
 use crate::math::{Aabb, Ray, RayRows};
 use hierarchy::Hierarchy;
 
 /// Up to this number of polygons and analytic shapes, packets are faster than Embree (`docs/performance.md`).
 const FEW: usize = 40;
+
+/// Beside them, up to this number of spheres and cylinders (`docs/accelerators.md`).
+const MANY_QUADRICS: usize = 3_000;
 
 /// Traces batches in packets, and single rays as the BVH does.
 ///
@@ -40,9 +43,26 @@ impl<'g> PacketBvh<'g> {
 
     /// Whether packets are faster than Embree for `geometry`.
     pub fn suits(geometry: &Geometry) -> bool {
+        let (quadrics, others): (Vec<&Shape>, Vec<&Shape>) =
+            geometry.world.iter().map(|&id| geometry.shape(id)).partition(|shape| is_quadric(shape));
         // Two triangles may make one polygon.
-        let count: usize = geometry.world.iter().map(|&id| geometry.shape(id).prim_count()).sum();
-        count <= 2 * FEW && is_static(geometry) && Hierarchy::new(geometry).is_some_and(|packets| packets.len() <= FEW)
+        let prims: usize = others.iter().map(|shape| shape.prim_count()).sum();
+        prims <= 2 * FEW
+            && quadrics.len() <= MANY_QUADRICS
+            && is_static(geometry)
+            && Hierarchy::new(geometry).is_some_and(|packets| packets.len() <= FEW + quadrics.len())
+    }
+}
+
+/// Whether a shape is a sphere or a cylinder.
+fn is_quadric(shape: &Shape) -> bool {
+    match shape {
+        Shape::Analytic(placed) => match &placed.shape {
+            Analytic::Sphere(_) => true,
+            Analytic::Frustum(frustum) => frustum.radii()[0] == frustum.radii()[1],
+            Analytic::Quad(_) | Analytic::Disk(_) | Analytic::Revolution(_) => false,
+        },
+        Shape::Mesh(_) => false,
     }
 }
 

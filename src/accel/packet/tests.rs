@@ -173,6 +173,13 @@ fn few_primitives_at_rest_suit_packets() {
     // Flat pairs count once.
     let many: Vec<_> = std::iter::repeat_n(cube(0), FEW / 6).flatten().collect();
     assert!(many.len() > FEW && PacketBvh::suits(&mesh_geometry(&many)));
+    let balls = |count: usize, radius: f64| {
+        let ball = Analytic::Sphere(Sphere::new(radius, -radius, radius, TAU).unwrap());
+        let at = |i: usize| Transform::new(DAffine3::from_translation(DVec3::X * i as f64)).unwrap();
+        let shapes = (0..count).map(|i| Shape::Analytic(TransformedShape::new(ball.clone(), at(i)))).collect();
+        Geometry { shapes, world: (0..count).map(ShapeId::new).collect(), ..Geometry::default() }
+    };
+    assert!(PacketBvh::suits(&balls(MANY_QUADRICS, 0.3)) && !PacketBvh::suits(&balls(MANY_QUADRICS + 1, 0.3)));
     let Shape::Mesh(mesh) = mesh_geometry(&cube(0)).shapes.remove(0) else { panic!("a mesh") };
     let step = crate::geometry::MeshStep { positions: mesh.positions().to_vec(), normals: None };
     let moving: Mesh = mesh.deforming(vec![step]).unwrap();
