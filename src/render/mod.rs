@@ -6,6 +6,7 @@
 mod caustic_pass;
 mod driver;
 mod exr_overrides;
+mod integrator_overrides;
 mod overrides;
 mod pixel_order;
 mod planner;

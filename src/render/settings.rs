@@ -5,11 +5,10 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use super::integrator_overrides::integrator;
 use super::{Overrides, TrainedGuide};
 use crate::accel::AccelKind;
-use crate::desc::{
-    CausticsDesc, FilterDesc, IntegratorDesc, MAX_SIDE, OutputDesc, PixelTypeDesc, SceneDesc, StrategyDesc, ViewDesc,
-};
+use crate::desc::{CausticsDesc, FilterDesc, IntegratorDesc, MAX_SIDE, OutputDesc, PixelTypeDesc, SceneDesc, ViewDesc};
 use crate::error::{Error, Result};
 use crate::film::{Crop, LayerSet};
 use crate::output::check_output;
@@ -149,7 +148,8 @@ fn overscan(desc: &SceneDesc, overrides: &Overrides, size: [u32; 2]) -> Result<u
     Ok(overscan)
 }
 
-fn usage(message: impl Into<String>) -> Error {
+/// An error of how options are used.
+pub(super) fn usage(message: impl Into<String>) -> Error {
     Error::Usage(message.into())
 }
 
@@ -181,102 +181,6 @@ fn crop(desc: &SceneDesc, overrides: &Overrides, size: [u32; 2], overscan: u32) 
         }
     }
     Ok(crop)
-}
-
-fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc> {
-    let mut integrator = match overrides.integrator {
-        Some(chosen) if std::mem::discriminant(&chosen) != std::mem::discriminant(&desc.integrator) => chosen,
-        _ => desc.integrator,
-    };
-    if let Some(depth) = overrides.max_depth {
-        match &mut integrator {
-            IntegratorDesc::Path { max_depth, .. } | IntegratorDesc::Whitted { max_depth, .. } if depth > 0 => {
-                *max_depth = depth;
-            }
-            IntegratorDesc::Path { .. } | IntegratorDesc::Whitted { .. } => {
-                return Err(usage("--max-depth 0: depth counts from 1, directly visible light"));
-            }
-            _ => {
-                return Err(usage(
-                    "--max-depth: only the integrators path and whitted follow light over several segments",
-                ));
-            }
-        }
-    }
-    if let Some(chosen) = overrides.strategy {
-        let IntegratorDesc::Path { strategy, .. } = &mut integrator else {
-            return Err(usage("--strategy: only the integrator path has strategies"));
-        };
-        *strategy = chosen;
-    }
-    if let Some(limit) = overrides.clamp {
-        let IntegratorDesc::Path { clamp, .. } = &mut integrator else {
-            return Err(usage("--clamp: only the integrator path can be clamped"));
-        };
-        if !(limit > 0.0) {
-            return Err(usage(format!("--clamp {limit}: a number above 0, or inf for no limit")));
-        }
-        *clamp = Some(limit).filter(|limit| limit.is_finite());
-    }
-    if let Some(alpha) = overrides.regularize {
-        let IntegratorDesc::Path { regularize, .. } = &mut integrator else {
-            return Err(usage("--regularize: only the integrator path makes surfaces rougher"));
-        };
-        if !(0.0..=1.0).contains(&alpha) {
-            return Err(usage(format!("--regularize {alpha}: an alpha within 0 and 1, 0 for none")));
-        }
-        *regularize = Some(alpha).filter(|&alpha| alpha > 0.0);
-    }
-    set_guiding(&mut integrator, overrides)?;
-    set_caustics(&mut integrator, overrides)?;
-    Ok(integrator)
-}
-
-fn set_guiding(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Result<()> {
-    if let Some(enabled) = overrides.guiding {
-        let IntegratorDesc::Path { guiding, .. } = integrator else {
-            return Err(usage("--guiding: only the integrator path can be guided"));
-        };
-        *guiding = enabled;
-    }
-    if overrides.guide.is_some() {
-        let IntegratorDesc::Path { guiding, .. } = integrator else {
-            return Err(usage("--guide: only the integrator path can be guided"));
-        };
-        // The guide is not trained further, whatever the scene says.
-        *guiding = false;
-    }
-    if matches!(integrator, IntegratorDesc::Path { guiding: true, .. }) && overrides.target_error.is_some() {
-        return Err(usage(
-            "--target-error: not with guiding; give --guide, --guiding off, or --spp or --time-limit in its place",
-        ));
-    }
-    Ok(())
-}
-
-fn set_caustics(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Result<()> {
-    if let Some(chosen) = overrides.caustics {
-        let IntegratorDesc::Path { caustics, .. } = integrator else {
-            return Err(usage("--caustics: only the integrator path traces photons"));
-        };
-        *caustics = chosen;
-    }
-    let IntegratorDesc::Path { caustics: CausticsDesc::Photons, strategy, regularize, guiding, .. } = integrator else {
-        return Ok(());
-    };
-    let other = [
-        (*strategy != StrategyDesc::Mis, "--strategy other than mis"),
-        (regularize.is_some(), "--regularize"),
-        (*guiding, "--guiding on"),
-        (overrides.guide.is_some(), "--guide"),
-        (overrides.target_error.is_some(), "--target-error"),
-    ];
-    match other.into_iter().find(|(is_given, _)| *is_given) {
-        Some((_, option)) => {
-            Err(usage(format!("--caustics photons: unsupported with {option}; give --caustics paths")))
-        }
-        None => Ok(()),
-    }
 }
 
 /// The number of threads that `--threads` means; without it, or with 0, all that the process may use.
@@ -430,6 +334,7 @@ mod tests {
             regularize: None,
             hide_emitters: false,
             guiding: false,
+            caustics: CausticsDesc::Paths,
         };
         assert_eq!(s.integrator, changed);
         assert_eq!(s.time_limit, Some(Duration::from_millis(1500)));
