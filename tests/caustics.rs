@@ -138,7 +138,7 @@ fn photons_find_what_a_mirror_shows_of_a_lamp() {
     let point = json!({ "type": "point", "position": [1, 1, 0], "intensity": [1, 1, 1] });
     let sphere = json!({
         "type": "sphere", "material": "white", "radius": 0.1, "transform": [{ "translate": [1, 1, 0] }],
-        "emission": { "radiance": 100.0 / std::f64::consts::PI }
+        "emission": { "radiance": [100.0 / std::f64::consts::PI; 3] }
     });
     let mean = |scene: &Value, caustics, spp| {
         let image = of(scene, caustics, &Overrides { spp: Some(spp), ..Overrides::default() });

@@ -6,8 +6,8 @@
 //! strategy than chance), and multiple importance sampling weighs both ways to find the same light.
 //!
 //! The sample index of a path decides on the photons that it gathers: each epoch of [`EPOCH`] samples has its own,
-//! which depend on the seed and on the epoch alone. The radius shrinks from epoch to epoch, so that the blur vanishes as
-//! samples are added (Knaus and Zwicker 2011).
+//! which depend on the seed and on the epoch alone. The radius shrinks from epoch to epoch, so that the blur vanishes
+//! as samples are added (Knaus and Zwicker 2011).
 
 mod casters;
 mod photon_map;
