@@ -48,7 +48,7 @@ fn balls() -> Value {
     )
 }
 
-/// A coat whose mirror is one of several lobes, a pane, and glass with the normals of a smooth surface on coarse facets.
+/// A coat whose mirror is one of several lobes, a pane, and glass with smooth normals on coarse facets.
 fn coats() -> Value {
     let corner = |x: f64, z: f64| json!([x, 0.45 - 0.5 * (x * x + z * z), z]);
     let at = |i: u32, j: u32| corner(0.4 * f64::from(i) - 0.6, 0.4 * f64::from(j) - 0.6);
@@ -58,7 +58,8 @@ fn coats() -> Value {
     scene_of(
         &json!([
             { "type": "mesh", "material": "glass", "positions": vertices, "triangles": indices, "shading": "smooth" },
-            { "type": "quad", "material": "pane", "origin": [0.8, 0, 1], "edge_u": [0, 0, -2], "edge_v": [0.3, 1.2, 0] },
+            { "type": "quad", "material": "pane", "origin": [0.8, 0, 1], "edge_u": [0, 0, -2],
+              "edge_v": [0.3, 1.2, 0] },
             { "type": "sphere", "material": "coat", "radius": 0.4, "transform": [{ "translate": [-1.3, 0.4, 0] }] }
         ]),
         &json!({
@@ -136,9 +137,10 @@ fn floor_radiance(lamp: f64) -> f64 {
 #[test]
 fn photons_find_what_a_mirror_shows_of_a_lamp() {
     let point = json!({ "type": "point", "position": [1, 1, 0], "intensity": [1, 1, 1] });
+    let radiance = 100.0 / std::f64::consts::PI;
     let sphere = json!({
         "type": "sphere", "material": "white", "radius": 0.1, "transform": [{ "translate": [1, 1, 0] }],
-        "emission": { "radiance": [100.0 / std::f64::consts::PI; 3] }
+        "emission": { "radiance": [radiance, radiance, radiance] }
     });
     let mean = |scene: &Value, caustics, spp| {
         let image = of(scene, caustics, &Overrides { spp: Some(spp), ..Overrides::default() });
