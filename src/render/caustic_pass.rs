@@ -24,6 +24,9 @@ const PHOTONS: RangeInclusive<f64> = 16_384.0..=4e6;
 /// Photons are gathered within this many widths of a pixel at the median distance of what the camera sees, at first.
 const RADIUS_IN_PIXELS: f32 = 2.0;
 
+/// The least radius in the first epoch, as a part of the largest coordinate: photons' points are rounded to `f32`.
+const LEAST_RADIUS: f32 = 1e-6;
+
 /// Camera rays on each side of the picture that find this distance.
 const PROBES: u32 = 48;
 
@@ -43,7 +46,10 @@ impl CausticPass {
         let casters = CausticCasters::new(scene)?;
         let [width, height] = settings.size.map(f64::from);
         let traced = (PHOTONS_PER_PIXEL * width * height).clamp(*PHOTONS.start(), *PHOTONS.end()) as u32;
+        let bounds = accel.bounds();
+        let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
         let radius = RADIUS_IN_PIXELS * median_pixel_width(scene, accel, settings.size)?;
+        let radius = radius.max(LEAST_RADIUS * farthest);
         Some(Self { casters, traced, radius, map: None })
     }
 
