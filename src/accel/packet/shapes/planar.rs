@@ -58,7 +58,7 @@ impl Planar {
         }
     }
 
-    /// See [`PacketShape::sides`].
+    /// See [`PacketShape::sides`](super::PacketShape::sides).
     #[inline(always)]
     pub fn sides(&self, rays: &RayPacket, t: &[f32; PACKET_SIZE], sides: &mut [f32; PACKET_SIZE]) {
         let (center, normal) = (self.exact_center, self.exact_normal);

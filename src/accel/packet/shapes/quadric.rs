@@ -115,7 +115,7 @@ impl Quadric {
         }
     }
 
-    /// See [`PacketShape::sides`].
+    /// See [`PacketShape::sides`](super::PacketShape::sides).
     #[inline(always)]
     pub fn sides<const CYLINDER: bool>(
         &self,
