@@ -54,14 +54,14 @@ pub struct DebugView {
     /// What to show.
     pub view: View,
     /// What the layers need.
-    pub needs: SurfaceAovs,
+    pub surface_aovs: SurfaceAovs,
     /// Which parts of the radiance layers need.
     pub light_aovs: LightAovRequest,
 }
 
 impl Integrator for DebugView {
     fn render_batch(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace) {
-        let request = AovRequest { surface: self.needs, light: self.light_aovs };
+        let request = AovRequest { surface: self.surface_aovs, light: self.light_aovs };
         let shade = |_: &CameraSample, _: &Ray, at: &SurfaceInteraction| self.view.color(pass.world, at);
         for_each_first_surface(pass, samples, request, workspace, shade);
     }
@@ -74,7 +74,7 @@ pub struct AmbientOcclusion {
     /// Where random numbers come from.
     pub sampler: Sampler,
     /// What the layers need.
-    pub needs: SurfaceAovs,
+    pub surface_aovs: SurfaceAovs,
     /// Which parts of the radiance layers need.
     pub light_aovs: LightAovRequest,
 }
@@ -84,7 +84,7 @@ impl Integrator for AmbientOcclusion {
         let world = pass.world;
         let mut shadow_rays = 0;
         let distance = (f64::from(self.distance) * world.scene.camera.render_space().scale()) as f32;
-        let request = AovRequest { surface: self.needs, light: self.light_aovs };
+        let request = AovRequest { surface: self.surface_aovs, light: self.light_aovs };
         for_each_first_surface(pass, samples, request, workspace, |sample, ray, at| {
             let u = self.sampler.sample_4d(sample.seed, sample.sample, dimensions::bsdf(0));
             let side = if at.n_g.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
@@ -110,7 +110,7 @@ struct AovRequest {
 fn for_each_first_surface(
     pass: &PassContext,
     samples: &CameraBatch,
-    AovRequest { surface: needs, light: light_aovs }: AovRequest,
+    AovRequest { surface: surface_aovs, light: light_aovs }: AovRequest,
     Workspace { out, counts, .. }: &mut Workspace,
     mut shade: impl FnMut(&CameraSample, &Ray, &SurfaceInteraction) -> Rgb,
 ) {
@@ -119,12 +119,12 @@ fn for_each_first_surface(
     let mut hits = vec![None; rays.len()];
     world.accel.intersect_batch(&rays, &mut hits, Coherence::Coherent);
     counts.camera += rays.len() as u64;
-    let needs_surface = needs != SurfaceAovs::default();
+    let needs_surface = surface_aovs != SurfaceAovs::default();
     out.reset(samples.len(), needs_surface, light_aovs);
     for (i, ((sample, ray), hit)) in samples.iter().zip(&rays).zip(hits).enumerate() {
         let sample = &sample;
         let Some(at) = world.resolve(ray, hit) else {
-            if needs.motion {
+            if surface_aovs.motion {
                 out.surfaces[i].motion = pass.render.motion_at_infinity(ray.direction).to_array();
             }
             continue;
@@ -133,9 +133,10 @@ fn for_each_first_surface(
         out.pixels[i] = PixelSample { radiance, alpha: 1.0 };
         add_emission(&mut out.light_aovs, i, radiance);
         if needs_surface {
-            out.surfaces[i] = surface_sample(pass, needs, FirstSurface { ray, hit: hit.as_ref(), at: &at }, || {
-                world.scene.texture_point(&at)
-            });
+            out.surfaces[i] =
+                surface_sample(pass, surface_aovs, FirstSurface { ray, hit: hit.as_ref(), at: &at }, || {
+                    world.scene.texture_point(&at)
+                });
         }
     }
 }

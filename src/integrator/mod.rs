@@ -228,15 +228,15 @@ pub struct Setup {
     /// Where random numbers come from.
     pub sampler: Sampler,
     /// What the layers need.
-    pub needs: SurfaceAovs,
+    pub surface_aovs: SurfaceAovs,
     /// Which parts of the radiance layers need.
     pub light_aovs: LightAovRequest,
 }
 
 /// The integrator with these parameters.
 pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
-    let Setup { sampler, needs, light_aovs } = setup;
-    let view = |view| Box::new(DebugView { view, needs, light_aovs }) as Box<dyn Integrator>;
+    let Setup { sampler, surface_aovs, light_aovs } = setup;
+    let view = |view| Box::new(DebugView { view, surface_aovs, light_aovs }) as Box<dyn Integrator>;
     match *desc {
         IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp, regularize, hide_emitters, .. } => {
             Box::new(PathIntegrator {
@@ -247,20 +247,23 @@ pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
                 regularization: regularize.map(|alpha| Regularization { alpha }),
                 hide_emitters,
                 sampler,
-                needs,
+                surface_aovs,
                 light_aovs,
             })
         }
         IntegratorDesc::Whitted { max_depth, ambient, hide_emitters } => {
-            Box::new(Whitted { max_depth, ambient: ambient.into(), hide_emitters, sampler, needs, light_aovs })
+            Box::new(Whitted { max_depth, ambient: ambient.into(), hide_emitters, sampler, surface_aovs, light_aovs })
         }
         IntegratorDesc::Normal => view(View::Normal),
         IntegratorDesc::ShadingNormal => view(View::ShadingNormal),
         IntegratorDesc::Uv => view(View::Uv),
         IntegratorDesc::Depth => view(View::Depth),
         IntegratorDesc::PrimitiveId => view(View::PrimitiveId),
-        IntegratorDesc::AmbientOcclusion { distance } => {
-            Box::new(AmbientOcclusion { distance: distance.unwrap_or(f32::INFINITY), sampler, needs, light_aovs })
-        }
+        IntegratorDesc::AmbientOcclusion { distance } => Box::new(AmbientOcclusion {
+            distance: distance.unwrap_or(f32::INFINITY),
+            sampler,
+            surface_aovs,
+            light_aovs,
+        }),
     }
 }

@@ -27,22 +27,22 @@ pub struct SurfaceAovs {
 /// found.
 pub(super) fn geometry_aovs(
     pass: &PassContext,
-    needs: SurfaceAovs,
+    surface_aovs: SurfaceAovs,
     at: &SurfaceInteraction,
     hit: Option<&Hit>,
 ) -> SurfaceSample {
     let (world, mut sample) = (pass.world, SurfaceSample::default());
-    if needs.geometry {
+    if surface_aovs.geometry {
         sample.depth = world.scene.camera.depth(at.p, at.time);
         sample.normal = at.n_s;
         sample.geometric_normal = at.n_g;
         sample.position = world.scene.camera.render_space().world_point(at.p).as_vec3();
         sample.visible_shape = ShapeKey { instance: at.instance.0, shape: at.shape.0 };
     }
-    if needs.uv {
+    if surface_aovs.uv {
         sample.uv = world.uv(at, hit).to_array();
     }
-    if needs.motion {
+    if surface_aovs.motion {
         sample.motion = pass.render.motion_of(at).to_array();
     }
     sample
@@ -59,15 +59,15 @@ pub(super) struct FirstSurface<'a> {
 /// The AOVs of the first surface, for integrators that do not follow specular paths for denoising features.
 pub(super) fn surface_sample<'f>(
     pass: &PassContext,
-    needs: SurfaceAovs,
+    surface_aovs: SurfaceAovs,
     FirstSurface { ray, hit, at }: FirstSurface,
     footprint: impl FnOnce() -> Footprint<'f>,
 ) -> SurfaceSample {
-    let mut sample = geometry_aovs(pass, needs, at, hit);
-    if needs.albedo || needs.features {
+    let mut sample = geometry_aovs(pass, surface_aovs, at, hit);
+    if surface_aovs.albedo || surface_aovs.features {
         sample.albedo = albedo_at(pass.world, at, ray, footprint);
     }
-    if needs.features {
+    if surface_aovs.features {
         let albedo = sample.albedo;
         set_features(&mut sample, Rgb::WHITE, albedo, at.n_s);
     }

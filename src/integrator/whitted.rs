@@ -34,7 +34,7 @@ pub struct Whitted {
     /// Where random numbers come from.
     pub sampler: Sampler,
     /// What the layers need.
-    pub needs: SurfaceAovs,
+    pub surface_aovs: SurfaceAovs,
     /// Which parts of the radiance layers need.
     pub light_aovs: LightAovRequest,
 }
@@ -43,7 +43,7 @@ impl Integrator for Whitted {
     fn render_batch(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace) {
         let (world, Workspace { out, counts, .. }) = (pass.world, workspace);
         counts.camera += samples.len() as u64;
-        let needs_surface = self.needs != SurfaceAovs::default();
+        let needs_surface = self.surface_aovs != SurfaceAovs::default();
         out.reset(samples.len(), needs_surface, self.light_aovs);
         for (i, sample) in samples.iter().enumerate() {
             let sample = &sample;
@@ -59,9 +59,9 @@ impl Integrator for Whitted {
                 out.surfaces[i] = match &segment.end {
                     Some(at) => {
                         let first = FirstSurface { ray: &segment.ray, hit: segment.hit.as_ref(), at };
-                        surface_sample(pass, self.needs, first, || segment.footprint(world, at))
+                        surface_sample(pass, self.surface_aovs, first, || segment.footprint(world, at))
                     }
-                    None if self.needs.motion => SurfaceSample {
+                    None if self.surface_aovs.motion => SurfaceSample {
                         motion: pass.render.motion_at_infinity(segment.ray.direction).to_array(),
                         ..SurfaceSample::default()
                     },

@@ -86,7 +86,7 @@ impl<'a> TileRenderer<'a> {
     pub fn new(scene: &'a Scene, accel: &'a dyn Accelerator, settings: &Settings) -> Self {
         let sampler = Sampler::new(settings.sampler, settings.seed);
         let has = |kind| settings.layers.contains(kind);
-        let needs = SurfaceAovs {
+        let surface_aovs = SurfaceAovs {
             // The distance decides which sample's data counts.
             geometry: settings.layers.surfaces(Filtering::Nearest).next().is_some() || settings.layers.needs_coverage(),
             uv: has(LayerKind::Uv),
@@ -102,11 +102,11 @@ impl<'a> TileRenderer<'a> {
         let (world, context) =
             (World::new(scene, accel), RenderContext::new(scene, settings.size, settings.spp.min(FINEST_SPP)));
         // Analytic shapes have their parameters only with the whole parametrisation.
-        let in_full = settings.integrator == IntegratorDesc::Uv || (needs.uv && scene.features.analytic_shapes);
+        let in_full = settings.integrator == IntegratorDesc::Uv || (surface_aovs.uv && scene.features.analytic_shapes);
         Self {
             world: if in_full { world.in_full() } else { world },
             context: if settings.transparent { context.without_background() } else { context },
-            integrator: integrator::build(&settings.integrator, Setup { sampler, needs, light_aovs }),
+            integrator: integrator::build(&settings.integrator, Setup { sampler, surface_aovs, light_aovs }),
             sampler,
             grid: FilmGrid::new(&shape, &filter, TILE_SIZE),
             overscan: settings.overscan,

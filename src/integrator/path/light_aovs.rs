@@ -29,7 +29,7 @@ impl LightAovs {
         self.lobes.clear();
         self.shadow_sources.clear();
         self.features.clear();
-        if config.needs.features {
+        if config.surface_aovs.features {
             self.features.resize(paths, Some(Rgb::WHITE));
         }
     }

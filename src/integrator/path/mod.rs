@@ -57,7 +57,7 @@ pub struct PathIntegrator {
     /// Where random numbers come from.
     pub sampler: Sampler,
     /// Which AOVs of surfaces are wanted.
-    pub needs: SurfaceAovs,
+    pub surface_aovs: SurfaceAovs,
     /// Which light AOVs are wanted.
     pub light_aovs: LightAovRequest,
 }
@@ -79,12 +79,12 @@ struct Context<'a> {
 impl Context<'_> {
     /// Whether any AOV of surfaces is requested.
     fn needs_surface_aovs(&self) -> bool {
-        self.config.needs != SurfaceAovs::default()
+        self.config.surface_aovs != SurfaceAovs::default()
     }
 
     /// Whether any AOV is requested that needs state beside paths.
     fn needs_aov_state(&self) -> bool {
-        self.config.light_aovs.by_scattering || self.config.needs.features
+        self.config.light_aovs.by_scattering || self.config.surface_aovs.features
     }
 }
 
@@ -94,7 +94,7 @@ pub(super) struct PathBuffers(Wave);
 
 impl Integrator for PathIntegrator {
     fn render_batch(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace) {
-        workspace.out.reset(samples.len(), self.needs != SurfaceAovs::default(), self.light_aovs);
+        workspace.out.reset(samples.len(), self.surface_aovs != SurfaceAovs::default(), self.light_aovs);
         self.render_wave(pass, samples, workspace);
     }
 

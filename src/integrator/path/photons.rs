@@ -48,7 +48,7 @@ pub(super) fn trace(
         rr_depth: u32::MAX,
         clamp: f32::INFINITY,
         hide_emitters: false,
-        needs: SurfaceAovs::default(),
+        surface_aovs: SurfaceAovs::default(),
         light_aovs: LightAovRequest::default(),
         ..config.clone()
     };

@@ -27,7 +27,7 @@ pub(super) fn write(context: &Context, wave: &mut Wave, block: usize, out: &mut 
 #[inline(never)]
 fn write_surfaces(context: &Context, wave: &mut Wave, block: usize, out: &mut Output) {
     let Wave { vertices, paths, hits, light_aovs, .. } = &*wave;
-    let needs = context.config.needs;
+    let surface_aovs = context.config.surface_aovs;
     for lane in (0..vertices.count).filter(|&lane| !vertices.is_miss(lane)) {
         let i = vertices.path(lane);
         let features = light_aovs.feature_throughput(block * BATCH + i);
@@ -37,9 +37,9 @@ fn write_surfaces(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
         let at = vertices.interaction(lane);
         let surface = &mut out.batch.surfaces[paths[block].slot[i] as usize];
         if context.bounce == 0 {
-            *surface = geometry_aovs(context.pass, needs, &at, hits[block].get(i).as_ref());
+            *surface = geometry_aovs(context.pass, surface_aovs, &at, hits[block].get(i).as_ref());
         }
-        if features.is_some() || needs.albedo {
+        if features.is_some() || surface_aovs.albedo {
             let albedo = albedo(context, vertices, lane, &at);
             if context.bounce == 0 {
                 surface.albedo = albedo;
@@ -68,7 +68,7 @@ pub(super) fn write_miss(
     radiance: impl FnOnce() -> Rgb,
     surface: &mut SurfaceSample,
 ) {
-    if context.bounce == 0 && context.config.needs.motion {
+    if context.bounce == 0 && context.config.surface_aovs.motion {
         surface.motion = context.pass.render.motion_at_infinity(direction).to_array();
     }
     if let Some(throughput) = features {

@@ -83,7 +83,7 @@ fn checkpoint(film: &Film, sums: &[Sum], squares: f64, spp: u32) -> Checkpoint {
 
 fn run(settings: &Settings, world: &World, to: u32) -> Option<Vec<Checkpoint>> {
     let sampler = Sampler::new(settings.sampler, settings.seed);
-    let setup = Setup { sampler, needs: SurfaceAovs::default(), light_aovs: LightAovRequest::default() };
+    let setup = Setup { sampler, surface_aovs: SurfaceAovs::default(), light_aovs: LightAovRequest::default() };
     let integrator = integrator::build(&settings.integrator, setup);
     let mut film = Film::new(FilmShape::new([WIDTH; 2], Crop::full([WIDTH; 2]), LayerSet::COLOR), WIDTH).ok()?;
     let (mut sums, mut squares) = (vec![Sum::default(); COUNT], 0.0);
