@@ -30,8 +30,8 @@ pub use output::{CompressionDesc, CryptoManifestDesc, ExrProfileDesc, LayerKind,
 pub(crate) use principled::principled_parameters;
 pub use principled::{PrincipledDesc, PrincipledModelDesc};
 pub use settings::{
-    CausticsDesc, FilmDesc, FilterDesc, FilterSamplesDesc, IntegratorDesc, MAX_FILTER_RADIUS, MAX_SIDE, SamplerDesc,
-    SamplerKindDesc, StrategyDesc,
+    CausticsDesc, DEFAULT_RR_DEPTH, FilmDesc, FilterDesc, FilterSamplesDesc, IntegratorDesc, MAX_FILTER_RADIUS,
+    MAX_SIDE, RouletteDesc, SamplerDesc, SamplerKindDesc, StrategyDesc,
 };
 pub use shape::{
     AttributeDesc, ConeDesc, CubeDesc, CylinderDesc, DiskDesc, EmissionDesc, InstanceDesc, MeshDesc, MeshShadingDesc,

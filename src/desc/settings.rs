@@ -213,6 +213,9 @@ pub enum IntegratorDesc {
         /// Segments before Russian roulette may end a path. Default: 5.
         #[serde(default = "default_rr_depth")]
         rr_depth: u32,
+        /// When Russian roulette may end a path. Default: throughput.
+        #[serde(default, skip_serializing_if = "RouletteDesc::is_default")]
+        roulette: RouletteDesc,
         /// How directions towards lights are found.
         #[serde(default)]
         strategy: StrategyDesc,
@@ -291,6 +294,7 @@ impl IntegratorDesc {
         Self::Path {
             max_depth,
             rr_depth,
+            roulette: RouletteDesc::default(),
             strategy,
             clamp: None,
             regularize: None,
@@ -320,8 +324,11 @@ fn default_max_depth() -> u32 {
     64
 }
 
+/// Segments before Russian roulette may end a path, where a scene does not say.
+pub const DEFAULT_RR_DEPTH: u32 = 5;
+
 fn default_rr_depth() -> u32 {
-    5
+    DEFAULT_RR_DEPTH
 }
 
 fn whitted_depth() -> u32 {
@@ -353,6 +360,26 @@ pub enum CausticsDesc {
     /// Also by photons traced from all lights: little noise. They blur caustics by up to two pixels; the blur vanishes
     /// as samples are added.
     Photons,
+}
+
+/// When Russian roulette may end a path. All give the same picture; they differ in noise and time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RouletteDesc {
+    /// From `rr_depth` segments on, by the throughput of the path.
+    #[default]
+    Throughput,
+    /// From the first scattering on, by what a path may add to its pixel and by what it costs, as a pilot of an eighth
+    /// of a sample of each pixel finds both. `rr_depth` is ignored.
+    Auto,
+    /// Never.
+    Off,
+}
+
+impl RouletteDesc {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 impl CausticsDesc {

@@ -13,6 +13,7 @@ mod media;
 mod path;
 mod regularization;
 mod render_context;
+mod roulette;
 mod shading;
 mod strategy;
 mod surface;
@@ -27,6 +28,7 @@ use path::PathBuffers;
 pub use path::PathIntegrator;
 pub use regularization::Regularization;
 pub use render_context::RenderContext;
+pub use roulette::{Continuation, ContinuationGrid, Roulette};
 pub(crate) use shading::{adapt_shading_normal, terminator_factor};
 pub use strategy::Strategy;
 pub use surface::SurfaceAovs;
@@ -35,10 +37,10 @@ pub use world::World;
 
 use std::ops::Range;
 
-use crate::desc::IntegratorDesc;
+use crate::desc::{IntegratorDesc, RouletteDesc};
 use crate::film::{LightAovRequest, SampleBatch};
 use crate::guiding::Guide;
-use crate::math::rows::BATCH;
+use crate::math::rows::{BATCH, Row};
 use crate::math::{Ray, RayRows};
 use crate::sampling::{PixelSeed, SampleIdRows, Sampler};
 
@@ -85,12 +87,20 @@ pub struct CameraBatch {
 }
 
 /// At most [`BATCH`] samples.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct CameraBlock {
     /// The camera rays.
     pub rays: RayRows,
     /// Pixels and indices of the samples.
     pub requests: SampleIdRows,
+    /// What Russian roulette multiplies throughputs by.
+    pub rr_scale: Row,
+}
+
+impl Default for CameraBlock {
+    fn default() -> Self {
+        Self { rays: RayRows::default(), requests: SampleIdRows::default(), rr_scale: [1.0; BATCH] }
+    }
 }
 
 impl CameraBatch {
@@ -141,7 +151,7 @@ impl CameraBatch {
     /// One sample after the other.
     pub fn iter(&self) -> impl Iterator<Item = CameraSample> {
         (0..self.count).map(|i| {
-            let (CameraBlock { rays, requests }, lane) = (&self.blocks[i / BATCH], i % BATCH);
+            let (CameraBlock { rays, requests, .. }, lane) = (&self.blocks[i / BATCH], i % BATCH);
             CameraSample { ray: rays.get(lane), seed: requests.pixels[lane], sample: requests.samples[lane] }
         })
     }
@@ -183,6 +193,8 @@ pub struct PassContext<'a> {
     pub guide: Option<&'a Guide>,
     /// The photons that paths gather, if they do.
     pub caustics: Option<&'a Caustics<'a>>,
+    /// What Russian roulette goes by, if it is [`Roulette::Auto`].
+    pub continuations: Option<&'a ContinuationGrid>,
 }
 
 /// The photons that a part of a pass traces.
@@ -220,6 +232,17 @@ pub trait Integrator: Send + Sync {
         _photons: &mut Vec<Photon>,
     ) {
     }
+
+    /// As [`render_batch`](Self::render_batch) for the radiance alone, and appends what paths found after each
+    /// scattering. Integrators without paths find nothing.
+    fn trace_pilot(
+        &self,
+        _pass: &PassContext,
+        _samples: &CameraBatch,
+        _workspace: &mut Workspace,
+        _continuations: &mut Vec<Continuation>,
+    ) {
+    }
 }
 
 /// What integrators need beside their parameters.
@@ -238,10 +261,14 @@ pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
     let Setup { sampler, surface_aovs, light_aovs } = setup;
     let view = |view| Box::new(DebugView { view, surface_aovs, light_aovs }) as Box<dyn Integrator>;
     match *desc {
-        IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp, regularize, hide_emitters, .. } => {
+        IntegratorDesc::Path { max_depth, rr_depth, roulette, strategy, clamp, regularize, hide_emitters, .. } => {
             Box::new(PathIntegrator {
                 max_depth,
-                rr_depth,
+                roulette: match roulette {
+                    RouletteDesc::Off => Roulette::Off,
+                    RouletteDesc::Throughput => Roulette::Throughput { from: rr_depth },
+                    RouletteDesc::Auto => Roulette::Auto,
+                },
                 strategy: strategy.into(),
                 clamp: clamp.unwrap_or(f32::INFINITY),
                 regularization: regularize.map(|alpha| Regularization { alpha }),

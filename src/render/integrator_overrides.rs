@@ -2,7 +2,7 @@
 
 use super::Overrides;
 use super::settings::usage;
-use crate::desc::{CausticsDesc, IntegratorDesc, SceneDesc, StrategyDesc};
+use crate::desc::{CausticsDesc, DEFAULT_RR_DEPTH, IntegratorDesc, RouletteDesc, SceneDesc, StrategyDesc};
 use crate::error::Result;
 
 /// The integrator of a scene, with the parameters that options set.
@@ -32,6 +32,7 @@ pub(super) fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<Inte
         };
         *strategy = chosen;
     }
+    set_roulette(&mut integrator, overrides)?;
     if let Some(limit) = overrides.clamp {
         let IntegratorDesc::Path { clamp, .. } = &mut integrator else {
             return Err(usage("--clamp: only the integrator path can be clamped"));
@@ -53,6 +54,20 @@ pub(super) fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<Inte
     set_guiding(&mut integrator, overrides)?;
     set_caustics(&mut integrator, overrides)?;
     Ok(integrator)
+}
+
+fn set_roulette(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Result<()> {
+    if let Some(chosen) = overrides.roulette {
+        let IntegratorDesc::Path { roulette, rr_depth, max_depth, .. } = integrator else {
+            return Err(usage("--roulette: only the integrator path plays Russian roulette"));
+        };
+        *roulette = chosen;
+        // Other renderers disable roulette by a depth that no path reaches.
+        if chosen == RouletteDesc::Throughput && *rr_depth >= *max_depth {
+            *rr_depth = DEFAULT_RR_DEPTH;
+        }
+    }
+    Ok(())
 }
 
 fn set_guiding(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Result<()> {

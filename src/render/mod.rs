@@ -12,6 +12,7 @@ mod pixel_order;
 mod planner;
 mod progress;
 mod provenance;
+mod roulette_pass;
 mod settings;
 mod state;
 mod tile_renderer;
@@ -166,6 +167,7 @@ pub fn replay(
     }
     let mut renderer = TileRenderer::new(scene, accel, settings);
     let workspace = [Mutex::<TileWorkspace>::default()];
+    renderer.prepare(&workspace);
     renderer.trace_photons(sample, &workspace);
     let [workspace] = workspace;
     let mut workspace = workspace.into_inner().unwrap_or_else(PoisonError::into_inner);

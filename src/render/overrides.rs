@@ -2,7 +2,7 @@
 
 use super::{ExrOverrides, TrainedGuide};
 use crate::accel::AccelKind;
-use crate::desc::{CausticsDesc, IntegratorDesc, LayerKind, SamplerKindDesc, StrategyDesc, ViewDesc};
+use crate::desc::{CausticsDesc, IntegratorDesc, LayerKind, RouletteDesc, SamplerKindDesc, StrategyDesc, ViewDesc};
 
 /// Overrides of the command line; `None` keeps the value of the scene.
 #[derive(Clone, Debug, Default)]
@@ -39,6 +39,8 @@ pub struct Overrides {
     pub clamp: Option<f32>,
     /// `--regularize`; 0 means none.
     pub regularize: Option<f32>,
+    /// `--roulette`.
+    pub roulette: Option<RouletteDesc>,
     /// `--caustics`.
     pub caustics: Option<CausticsDesc>,
     /// `--guiding`.

@@ -258,7 +258,7 @@ fn outputs(desc: &SceneDesc, overrides: &Overrides, integrator: &IntegratorDesc)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::desc::{SamplerKindDesc, StrategyDesc};
+    use crate::desc::{RouletteDesc, SamplerKindDesc, StrategyDesc};
     use crate::film::LayerKind;
 
     fn scene(text: &str) -> SceneDesc {
@@ -334,6 +334,7 @@ mod tests {
             regularize: None,
             hide_emitters: false,
             guiding: false,
+            roulette: RouletteDesc::Throughput,
             caustics: CausticsDesc::Paths,
         };
         assert_eq!(s.integrator, changed);

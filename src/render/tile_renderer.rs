@@ -5,20 +5,21 @@ use std::sync::Mutex;
 
 use super::caustic_pass::CausticPass;
 use super::pixel_order::{pixel_of_slot, slots};
+use super::roulette_pass::RouletteEstimates;
 use super::{FINEST_SPP, Settings, TILE_SIZE, film_shape};
 use crate::accel::Accelerator;
-use crate::desc::IntegratorDesc;
+use crate::desc::{IntegratorDesc, RouletteDesc};
 use crate::film::{
     FilmGrid, FilmTile, Filter, FilterSample, Filtering, LayerKind, LightAovRequest, Splats, WorldSample,
 };
 use crate::guiding::Guide;
 use crate::integrator::{
-    self, CameraBatch, CameraBlock, Integrator, PassContext, RayCounts, RenderContext, Setup, SurfaceAovs, Workspace,
+    self, CameraBatch, CameraBlock, Continuation, Integrator, PassContext, RayCounts, RenderContext, Setup, SurfaceAovs, Workspace,
     World, dimensions,
 };
 use crate::math::Vec2;
 use crate::math::rows::{BATCH, Row, pair};
-use crate::sampling::{SampleIdRows, SampleRows, Sampler};
+use crate::sampling::{PixelSeed, SampleIdRows, SampleRows, Sampler};
 use crate::scene::Scene;
 
 /// What renders samples of tiles; it does not change during a render.
@@ -26,18 +27,21 @@ pub(super) struct TileRenderer<'a> {
     world: World<'a>,
     pub context: RenderContext<'a>,
     integrator: Box<dyn Integrator>,
-    sampler: Sampler,
+    pub sampler: Sampler,
     filter: Filter,
     /// Pixels on each side of the picture.
     overscan: u32,
     /// Width and height of what the camera shows.
-    view: [u32; 2],
+    pub view: [u32; 2],
     /// Where the film's pixels are.
     pub grid: FilmGrid,
     /// What guides all samples, if it was trained before.
     guide: Option<Guide>,
     /// What traces and keeps photons, if paths gather them.
     caustics: Option<CausticPass>,
+    /// What Russian roulette goes by, if it is to and the pilot was traced.
+    roulette: Option<RouletteEstimates>,
+    needs_pilot: bool,
 }
 
 /// The buffers of one thread.
@@ -76,6 +80,11 @@ impl Default for TileWorkspace {
 }
 
 impl TileWorkspace {
+    /// Samples of the batch.
+    pub fn sample_count(&self) -> usize {
+        self.samples.len()
+    }
+
     /// The radiance of a sample of the batch.
     pub fn radiance(&self, slot: usize) -> [f64; 3] {
         self.integrator.out.radiance(slot)
@@ -114,11 +123,52 @@ impl<'a> TileRenderer<'a> {
             view: settings.size,
             caustics: settings.gathers_photons().then(|| CausticPass::new(scene, accel, settings)).flatten(),
             guide: settings.guide.as_ref().and_then(|guide| guide.of_scene(accel.bounds())),
+            roulette: None,
+            needs_pilot: matches!(settings.integrator, IntegratorDesc::Path { roulette: RouletteDesc::Auto, .. }),
         }
     }
 
     fn pass<'b>(&'b self, guide: Option<&'b Guide>) -> PassContext<'b> {
-        PassContext { world: &self.world, render: self.context, guide, caustics: None }
+        let continuations = self.roulette.as_ref().map(|roulette| &roulette.continuations);
+        PassContext { world: &self.world, render: self.context, guide, caustics: None, continuations }
+    }
+
+    /// Traces the pilot of the picture, if roulette needs one; the result is the rays traced.
+    pub fn prepare(&mut self, workspaces: &[Mutex<TileWorkspace>]) -> RayCounts {
+        if !self.needs_pilot {
+            return RayCounts::default();
+        }
+        let (roulette, counts) = RouletteEstimates::new(self, workspaces);
+        self.roulette = roulette;
+        counts
+    }
+
+    /// Traces samples of any seeds through points of the film, at most as many as a tile has pixels.
+    pub fn trace_pilot(
+        &self,
+        ids: &mut impl Iterator<Item = (u32, PixelSeed, u32)>,
+        point: impl Fn((u32, PixelSeed)) -> Vec2,
+        workspace: &mut TileWorkspace,
+        continuations: &mut Vec<Continuation>,
+    ) {
+        let TileWorkspace { samples, film, numbers, integrator, .. } = workspace;
+        samples.clear();
+        loop {
+            let block = samples.next_block();
+            let mut count = 0;
+            for (i, seed, sample) in ids.take(BATCH) {
+                (block.requests.pixels[count], block.requests.samples[count]) = (seed, sample);
+                (film[0][count], film[1][count]) = point((i, seed)).into();
+                count += 1;
+            }
+            if count == 0 {
+                break;
+            }
+            self.sampler.sample_4d_batch(&block.requests, count, dimensions::CAMERA, numbers);
+            self.camera_rays(count, film, numbers, block);
+            samples.extend(count);
+        }
+        self.integrator.trace_pilot(&self.pass(None), samples, integrator, continuations);
     }
 
     /// Traces the photons of a sample's epoch, unless they are there; the result is the rays traced.
@@ -162,6 +212,9 @@ impl<'a> TileRenderer<'a> {
                     film[k][i] = pixels[i][k] as i32 as f32 + 0.5 + offset;
                 }
             }
+            if let Some(roulette) = &self.roulette {
+                roulette.set_scales(&pixels[..count], &mut block.rr_scale);
+            }
             self.camera_rays(count, film, numbers, block);
             camera_batch.extend(count);
         }
@@ -193,7 +246,7 @@ impl<'a> TileRenderer<'a> {
     /// Sets the rays through the points of the film.
     #[inline]
     fn camera_rays(&self, count: usize, film: &[Row; 2], numbers: &SampleRows, block: &mut CameraBlock) {
-        let CameraBlock { rays, requests } = block;
+        let CameraBlock { rays, requests, .. } = block;
         let (camera, moves) = (&self.world.scene.camera, self.world.scene.features.motion);
         rays.time = [0.0; BATCH];
         if moves {

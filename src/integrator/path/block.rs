@@ -157,6 +157,8 @@ soa! {
         rr_scale: f32,
         /// As in `PathRows`.
         path_flags: u32,
+        /// Factor on what roulette decides by: the value of going on from the vertex.
+        continuation: f32,
     }
 }
 

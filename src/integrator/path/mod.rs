@@ -8,6 +8,7 @@
 
 mod block;
 mod caustics;
+mod continuations;
 mod direct;
 mod emission;
 mod guided;
@@ -27,8 +28,8 @@ mod wave;
 use super::cancel;
 use super::regularization::Regularization;
 use super::{
-    CameraBatch, CausticCasters, Integrator, PassContext, Photon, PhotonRange, Strategy, SurfaceAovs, Workspace, World,
-    dimensions,
+    CameraBatch, CausticCasters, Continuation, Integrator, PassContext, Photon, PhotonRange, Roulette, Strategy,
+    SurfaceAovs, Workspace, World, dimensions,
 };
 use crate::color::Rgb;
 use crate::film::LightAovRequest;
@@ -38,13 +39,16 @@ use crate::scene::Scene;
 use radiance::Output;
 use wave::Wave;
 
+/// Segments before the roulette of pilot paths.
+const PILOT_RR_DEPTH: u32 = 4;
+
 /// Path tracing.
 #[derive(Clone, Debug)]
 pub struct PathIntegrator {
     /// Largest number of segments from the camera; 1 shows only directly visible light.
     pub max_depth: u32,
-    /// Segments before Russian roulette may end a path.
-    pub rr_depth: u32,
+    /// When Russian roulette may end a path.
+    pub roulette: Roulette,
     /// How directions towards lights are found.
     pub strategy: Strategy,
     /// Largest channel that a single contribution of indirect light keeps: less noise for too little light. Infinite
@@ -108,6 +112,26 @@ impl Integrator for PathIntegrator {
     ) {
         photons::trace(self, pass, &photons::Source { casters, range }, workspace, photons);
     }
+
+    fn trace_pilot(
+        &self,
+        pass: &PassContext,
+        samples: &CameraBatch,
+        workspace: &mut Workspace,
+        continuations: &mut Vec<Continuation>,
+    ) {
+        let pilot = Self {
+            roulette: Roulette::Throughput { from: PILOT_RR_DEPTH },
+            surface_aovs: SurfaceAovs::default(),
+            light_aovs: LightAovRequest::default(),
+            ..self.clone()
+        };
+        let pass = PassContext { guide: None, caustics: None, continuations: None, ..*pass };
+        workspace.paths.0.continuations.enable();
+        pilot.render_batch(&pass, samples, workspace);
+        let Workspace { out, paths: PathBuffers(wave), .. } = workspace;
+        wave.continuations.finish(&Output { batch: out }, samples.len(), continuations);
+    }
 }
 
 impl PathIntegrator {
@@ -168,6 +192,7 @@ impl PathIntegrator {
             wave.finish_bounce(survivors);
             trace::shadow(context, wave, out, counts);
             wave.guided.mark_radiance(out);
+            wave.continuations.mark_radiance(out);
         }
         wave.guided.commit(guide, out);
         counts.add(&wave.counts);

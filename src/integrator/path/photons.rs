@@ -9,8 +9,8 @@ use crate::film::LightAovRequest;
 use crate::geometry::Hit;
 use crate::id::LightId;
 use crate::integrator::{
-    CameraBatch, CameraSample, CausticCasters, CausticPoint, PassContext, Photon, PhotonRange, RayCounts, SurfaceAovs,
-    Workspace, cancel, dimensions,
+    CameraBatch, CameraSample, CausticCasters, CausticPoint, PassContext, Photon, PhotonRange, RayCounts, Roulette,
+    SurfaceAovs, Workspace, cancel, dimensions,
 };
 use crate::light::{LightSampleContext, ShadowTarget};
 use crate::math::rows::BATCH;
@@ -45,14 +45,14 @@ pub(super) fn trace(
 ) {
     // No roulette: what a photon loses at mirrors and glass is little.
     let config = &PathIntegrator {
-        rr_depth: u32::MAX,
+        roulette: Roulette::Off,
         clamp: f32::INFINITY,
         hide_emitters: false,
         surface_aovs: SurfaceAovs::default(),
         light_aovs: LightAovRequest::default(),
         ..config.clone()
     };
-    let pass = &PassContext { guide: None, caustics: None, ..*pass };
+    let pass = &PassContext { guide: None, caustics: None, continuations: None, ..*pass };
     let (world, compensation) = (pass.world, config.strategy.compensation());
     let mut context = Context { config, pass, world, scene: world.scene, bounce: 0, is_last: false, compensation };
     let Workspace { counts, paths: PathBuffers(wave), .. } = workspace;

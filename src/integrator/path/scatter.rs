@@ -9,6 +9,7 @@ use super::wave::{BsdfScratch, Wave, path_flags};
 use crate::bsdf::Lambert;
 use crate::geometry::SpawnPoint;
 use crate::guiding::Guide;
+use crate::integrator::roulette::SurvivalRange;
 use crate::integrator::vertex::HemisphereTest;
 use crate::math::Frame;
 use crate::math::rows::BATCH;
@@ -29,12 +30,19 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
         guided.mix(context, regions, vertices);
     }
     let Vertices { rows, points, scatter, u_bsdf, .. } = &mut *vertices;
-    let roulette = context.bounce + 1 >= context.config.rr_depth;
-    let no_lights = context.scene.lights.is_empty();
+    let continuations = context.pass.continuations;
+    match continuations {
+        Some(grid) => grid.find(&points.p, &rows.n, &rows.wo.0[2], &mut scatter.continuation, count),
+        None => scatter.continuation = [1.0; BATCH],
+    }
+    let rule = SpawnRule {
+        survival: context.config.roulette.range(context.bounce, continuations.is_some()),
+        no_lights: context.scene.lights.is_empty(),
+    };
     if context.scene.features.normal_perturbations {
-        vectorize!(spawn_rays::<true>(rows, points, scatter, u_bsdf, [roulette, no_lights], count));
+        vectorize!(spawn_rays::<true>(rows, points, scatter, u_bsdf, rule, count));
     } else {
-        vectorize!(spawn_rays::<false>(rows, points, scatter, u_bsdf, [roulette, no_lights], count));
+        vectorize!(spawn_rays::<false>(rows, points, scatter, u_bsdf, rule, count));
     }
     if context.scene.features.shading_normals {
         wave.counts.indirect += terminator::offset(
@@ -51,6 +59,7 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
     if context.pass.guide.is_some_and(Guide::learns) {
         guided.record(vertices, &paths[block]);
     }
+    wave.continuations.record(&wave.vertices, &wave.paths[block]);
 }
 
 /// Samples the BSDFs that are not diffuse.
@@ -99,11 +108,11 @@ fn sample_diffuse(rows: &VertexRows, scatter: &mut ScatterRows, u: &SampleRows, 
     }
 }
 
-/// Probability with which Russian roulette lets a path go on: what it has left of its throughput, so that one that lost
-/// nothing always goes on.
-#[inline(always)]
-fn survival_probability(max_throughput: f32, rr_scale: f32) -> f32 {
-    (max_throughput * rr_scale).min(1.0)
+/// Which of the sampled directions paths take.
+#[derive(Clone, Copy)]
+struct SpawnRule {
+    survival: SurvivalRange,
+    no_lights: bool,
 }
 
 #[inline(always)]
@@ -112,7 +121,7 @@ fn spawn_rays<const PERTURBED: bool>(
     points: &PointRows,
     scatter: &mut ScatterRows,
     u: &SampleRows,
-    [roulette, no_lights]: [bool; 2],
+    rule: SpawnRule,
     count: usize,
 ) {
     for i in 0..count.min(BATCH) {
@@ -128,7 +137,7 @@ fn spawn_rays<const PERTURBED: bool>(
 
         let mut throughput = rows.throughput.get(i) * weight;
         let rr_scale = rows.rr_scale[i] * scatter.rr_factor[i];
-        let survival = if roulette { survival_probability(throughput.max_channel(), rr_scale) } else { 1.0 };
+        let survival = rule.survival.probability(throughput.max_channel(), rr_scale * scatter.continuation[i]);
         let goes_on = (scatter.is_valid[i] != 0) & ((survival >= 1.0) | (u.of(i)[3] < survival));
         throughput *= if survival < 1.0 { 1.0 / survival } else { 1.0 };
         let goes_on = goes_on & !throughput.is_black();
@@ -139,7 +148,7 @@ fn spawn_rays<const PERTURBED: bool>(
         scatter.origin.set(i, start.ray_along(direction).origin);
         scatter.direction.set(i, direction);
         let is_delta = scatter.is_delta[i] != 0;
-        let specular = if is_delta | no_lights { path_flags::SPECULAR } else { 0 };
+        let specular = if is_delta | rule.no_lights { path_flags::SPECULAR } else { 0 };
         let non_specular =
             if is_delta { rows.path_flags[i] & path_flags::ANY_NON_SPECULAR } else { path_flags::ANY_NON_SPECULAR };
         scatter.path_flags[i] = specular | non_specular;

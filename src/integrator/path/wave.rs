@@ -2,6 +2,7 @@
 
 use super::block::{Vertices, spawn};
 use super::caustics::CausticState;
+use super::continuations::ContinuationRecorder;
 use super::guided::GuideRecorder;
 use super::light_aovs::{LightAovs, PathMove};
 use super::miss::MissScratch;
@@ -16,7 +17,7 @@ use crate::integrator::media::MediaState;
 use crate::integrator::{CameraBatch, CameraBlock, RayCounts};
 use crate::light::{LightQueue, LightSampleContext};
 use crate::math::compact::Compaction;
-use crate::math::rows::{BATCH, soa};
+use crate::math::rows::{BATCH, Row, soa};
 use crate::math::{DVec3, Ray, RayCone, RayRows, Vec3};
 use crate::sampling::{PixelSeed, SampleIdRows};
 
@@ -56,9 +57,9 @@ soa! {
 
 impl PathRows {
     /// Starts the paths of a block of camera samples, the first of which has this index in the wave.
-    fn start(&mut self, requests: &SampleIdRows, first: usize) {
+    fn start(&mut self, requests: &SampleIdRows, rr_scale: &Row, first: usize) {
         self.throughput = RgbRows([[1.0; BATCH]; 3]);
-        self.rr_scale = [1.0; BATCH];
+        self.rr_scale = *rr_scale;
         self.flags = [path_flags::SPECULAR; BATCH];
         self.sample = requests.samples;
         for (i, PixelSeed(seed)) in requests.pixels.iter().enumerate() {
@@ -138,6 +139,7 @@ pub(super) struct Wave {
     pub photons: Vec<PhotonState>,
     pub light_aovs: LightAovs,
     pub guided: GuideRecorder,
+    pub continuations: ContinuationRecorder,
     pub vertices: Vertices,
     pub shadows: ShadowQueue,
     pub terminator_rays: TerminatorRays,
@@ -158,9 +160,9 @@ impl Wave {
             self.rays.resize_with(blocks, RayRows::default);
             self.hits.resize_with(blocks, HitRows::default);
         }
-        for (block, CameraBlock { rays, requests }) in samples.blocks().iter().enumerate() {
+        for (block, CameraBlock { rays, requests, rr_scale }) in samples.blocks().iter().enumerate() {
             self.rays[block].clone_from(rays);
-            self.paths[block].start(requests, block * BATCH);
+            self.paths[block].start(requests, rr_scale, block * BATCH);
         }
         self.media.clear();
         if context.scene.features.media {

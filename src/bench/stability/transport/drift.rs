@@ -88,7 +88,13 @@ fn run(settings: &Settings, world: &World, to: u32) -> Option<Vec<Checkpoint>> {
     let mut film = Film::new(FilmShape::new([WIDTH; 2], Crop::full([WIDTH; 2]), LayerSet::COLOR), WIDTH).ok()?;
     let (mut sums, mut squares) = (vec![Sum::default(); COUNT], 0.0);
     let (pass, mut workspace) = (
-        PassContext { world, render: RenderContext::new(world.scene, [WIDTH; 2], to), guide: None, caustics: None },
+        PassContext {
+            world,
+            render: RenderContext::new(world.scene, [WIDTH; 2], to),
+            guide: None,
+            caustics: None,
+            continuations: None,
+        },
         Workspace::default(),
     );
     let (mut checkpoints, mut next) = (Vec::new(), 1);

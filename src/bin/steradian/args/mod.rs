@@ -21,7 +21,7 @@ use std::path::PathBuf;
 use clap::{ArgAction, Args, Parser, Subcommand};
 use clap_complete::Shell;
 use steradian::accel::AccelKind;
-use steradian::desc::{CausticsDesc, IntegratorDesc, SamplerKindDesc, StrategyDesc, ViewDesc};
+use steradian::desc::{CausticsDesc, IntegratorDesc, RouletteDesc, SamplerKindDesc, StrategyDesc, ViewDesc};
 use steradian::render::Overrides;
 
 use crate::names::{self, Layers};
@@ -229,6 +229,13 @@ pub struct RenderArgs {
     /// How directions towards lights are found
     #[arg(long, value_name = "NAME", value_parser = names::plain::<StrategyDesc>(), help_heading = "Algorithm")]
     pub strategy: Option<StrategyDesc>,
+    /// Russian roulette: auto, throughput or off
+    ///
+    /// auto ends paths by what they may still add to their pixel and by what they cost; throughput by their throughput,
+    /// from the depth that the scene gives (from 5 if it disables roulette). The picture is the same but for its noise.
+    /// Default: that of the scene
+    #[arg(long, value_name = "NAME", value_parser = names::plain::<RouletteDesc>(), help_heading = "Algorithm")]
+    pub roulette: Option<RouletteDesc>,
     /// Clamp the contribution of a single path of indirect light: less noise, but biased (too dark). Off by default;
     /// inf for no limit
     #[arg(long, value_name = "LIMIT", help_heading = "Algorithm")]
@@ -386,6 +393,7 @@ impl RenderArgs {
             transparent: self.transparent,
             max_depth: self.max_depth,
             strategy: self.strategy,
+            roulette: self.roulette,
             clamp: self.clamp,
             regularize: self.regularize,
             caustics: self.caustics,

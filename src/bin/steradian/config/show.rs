@@ -13,7 +13,7 @@ use crate::log::{self, Level};
 use crate::text;
 
 /// Options whose values a scene has, with their places in it.
-const IN_SCENES: [(&str, &[&str]); 12] = [
+const IN_SCENES: [(&str, &[&str]); 13] = [
     ("output", &["/outputs"]),
     ("spp", &["/sampler/spp"]),
     ("size", &["/film/width", "/film/height"]),
@@ -21,6 +21,7 @@ const IN_SCENES: [(&str, &[&str]); 12] = [
     ("integrator", &["/integrator/type"]),
     ("max-depth", &["/integrator/max_depth"]),
     ("strategy", &["/integrator/strategy"]),
+    ("roulette", &["/integrator/roulette"]),
     ("clamp", &["/integrator/clamp"]),
     ("regularize", &["/integrator/regularize"]),
     ("caustics", &["/integrator/caustics"]),

@@ -1,0 +1,76 @@
+//! What pilot paths find after each scattering, for Russian roulette.
+
+use super::block::{Vertices, spawn};
+use super::radiance::Output;
+use super::wave::PathRows;
+use crate::color::Rgb;
+use crate::integrator::Continuation;
+use crate::math::Vec3;
+
+/// Rays of a vertex beyond the recorded one: the ray that goes on and the shadow ray.
+const RAYS_OF_VERTEX: f32 = 2.0;
+
+/// A scattering of a path.
+#[derive(Clone, Copy, Debug)]
+struct ScatteredPath {
+    p: Vec3,
+    n: Vec3,
+    /// The largest channel of the throughput of the path that goes on.
+    throughput: f32,
+    radiance_before: Rgb,
+    slot: u32,
+}
+
+/// The scatterings of a wave of pilot paths.
+#[derive(Debug, Default)]
+pub(super) struct ContinuationRecorder {
+    is_enabled: bool,
+    scattered: Vec<ScatteredPath>,
+    /// How many of them have their `radiance_before`.
+    marked: usize,
+}
+
+impl ContinuationRecorder {
+    /// For the next wave.
+    pub fn enable(&mut self) {
+        *self = Self { is_enabled: true, ..Self::default() };
+    }
+
+    /// Records the paths that go on.
+    pub fn record(&mut self, vertices: &Vertices, paths: &PathRows) {
+        if !self.is_enabled {
+            return;
+        }
+        let scatter = &vertices.scatter;
+        for lane in (0..vertices.count).filter(|&lane| scatter.status[lane] == spawn::SPAWNED) {
+            self.scattered.push(ScatteredPath {
+                p: vertices.points.p.get(lane).as_vec3(),
+                n: vertices.facing_normal(lane),
+                throughput: scatter.throughput.get(lane).max_channel(),
+                radiance_before: Rgb::BLACK,
+                slot: paths.slot[vertices.path(lane)],
+            });
+        }
+    }
+
+    /// All that is added to the samples from here on came by the rays that were recorded last.
+    pub fn mark_radiance(&mut self, out: &Output) {
+        for path in &mut self.scattered[self.marked..] {
+            path.radiance_before = out.batch.pixels[path.slot as usize].radiance;
+        }
+        self.marked = self.scattered.len();
+    }
+
+    /// Appends what the wave of `samples` samples has found, and records no longer.
+    pub fn finish(&mut self, out: &Output, samples: usize, continuations: &mut Vec<Continuation>) {
+        let mut later = vec![0.0; samples];
+        for path in self.scattered.iter().rev() {
+            let later = &mut later[path.slot as usize];
+            *later += RAYS_OF_VERTEX;
+            let found = out.batch.pixels[path.slot as usize].radiance - path.radiance_before;
+            let radiance = found.max_channel().max(0.0) / path.throughput;
+            continuations.push(Continuation { p: path.p, n: path.n, radiance, rays: *later });
+        }
+        *self = Self::default();
+    }
+}

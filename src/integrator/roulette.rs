@@ -1,0 +1,264 @@
+//! Russian roulette by what a path is worth ("EARS: Efficiency-Aware Russian Roulette and Splitting", Rath et al. 2022,
+//! without splitting): a path goes on with a probability in proportion to what it may still add to the error of its
+//! pixel, over the root of what going on costs.
+
+use crate::desc::DEFAULT_RR_DEPTH;
+use crate::math::rows::{BATCH, DVec3Rows, Row, Vec3Rows};
+use crate::math::vectorize::vectorize;
+use crate::math::{Aabb, Vec3};
+
+/// When Russian roulette may end a path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Roulette {
+    /// Never.
+    Off,
+    /// From this many segments on, by the throughput.
+    Throughput {
+        /// At least 1.
+        from: u32,
+    },
+    /// From the first scattering on, by [`ContinuationGrid`]; where nothing is known, as `Throughput` from 5.
+    Auto,
+}
+
+/// The least probability of going on that estimates lead to: no path becomes more than 10 times as bright by a wrong
+/// one.
+const MIN_SURVIVAL: f32 = 0.1;
+
+/// The probability of going on: the throughput times its scale, within these limits.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SurvivalRange {
+    /// 1 where there is no roulette.
+    pub least: f32,
+}
+
+impl SurvivalRange {
+    /// Probability with which Russian roulette lets a path go on.
+    #[inline(always)]
+    pub fn probability(self, max_throughput: f32, scale: f32) -> f32 {
+        let share = max_throughput * scale;
+        // NaN becomes 1: it must be seen in the sample.
+        let share = if share < self.least { self.least } else { share };
+        share.min(1.0)
+    }
+}
+
+impl Roulette {
+    /// The range of probabilities after `bounce` scatterings.
+    pub(super) fn range(self, bounce: u32, has_estimates: bool) -> SurvivalRange {
+        let from = match self {
+            Self::Off => u32::MAX,
+            Self::Throughput { from } => from,
+            Self::Auto if has_estimates => return SurvivalRange { least: MIN_SURVIVAL },
+            Self::Auto => DEFAULT_RR_DEPTH,
+        };
+        SurvivalRange { least: if bounce + 1 >= from { 0.0 } else { 1.0 } }
+    }
+}
+
+/// What a path found after it was scattered.
+#[derive(Clone, Copy, Debug)]
+pub struct Continuation {
+    /// Where it was scattered.
+    pub p: Vec3,
+    /// The normal there, on the side of the path.
+    pub n: Vec3,
+    /// Radiance of the sampled direction: what the path added to its sample, over its throughput.
+    pub radiance: f32,
+    /// Rays traced from there on.
+    pub rays: f32,
+}
+
+/// Cells along the longest axis, by level; each level has the cells of the one before in parts.
+const LEVELS: [usize; 3] = [2, 8, 32];
+
+/// Directions of normals that are told apart: octants.
+const SIDES: usize = 8;
+
+/// As many records as this give the level above in a cell's estimate.
+const PRIOR_RECORDS: f64 = 8.0;
+
+/// A record counts with this many times the mean radiance at most.
+const MAX_RADIANCE: f32 = 20.0;
+
+/// Records at either end of an axis that may lie outside of the grid, of all.
+const OUTLIERS: f64 = 0.005;
+
+/// By where a path is scattered, the root of the mean squared radiance that it finds over the rays that takes.
+#[derive(Clone, Debug)]
+pub struct ContinuationGrid {
+    corner: Vec3,
+    cells_per_unit: f32,
+    /// By cell and side.
+    roots: Vec<f32>,
+}
+
+/// Sums over the records of a cell.
+#[derive(Clone, Copy, Default)]
+struct CellSums {
+    count: f64,
+    squared: f64,
+    rays: f64,
+}
+
+impl CellSums {
+    fn add(&mut self, radiance: f32, rays: f32) {
+        self.count += 1.0;
+        self.squared += f64::from(radiance) * f64::from(radiance);
+        self.rays += f64::from(rays);
+    }
+
+    /// The means with [`PRIOR_RECORDS`] of those of another cell.
+    fn means(&self, prior: [f64; 2]) -> [f64; 2] {
+        let count = self.count + PRIOR_RECORDS;
+        [(self.squared + PRIOR_RECORDS * prior[0]) / count, (self.rays + PRIOR_RECORDS * prior[1]) / count]
+    }
+}
+
+impl ContinuationGrid {
+    /// From what pilot paths found; `None` if they found no light.
+    pub fn new(records: &[Continuation]) -> Option<Self> {
+        let finite = |record: &&Continuation| record.p.is_finite() && record.radiance.is_finite();
+        let records: Vec<Continuation> = records.iter().filter(finite).copied().collect();
+        let mean = (records.iter().map(|record| f64::from(record.radiance)).sum::<f64>() / records.len() as f64) as f32;
+        if !(mean > 0.0 && mean < f32::INFINITY) {
+            return None;
+        }
+        let bounds = bounds_without_outliers(&records);
+        let size = bounds.size().max_element();
+        let mut grid = Self {
+            corner: bounds.min,
+            cells_per_unit: if size > 0.0 && size < f32::INFINITY { LEVELS[2] as f32 / size } else { 0.0 },
+            roots: Vec::new(),
+        };
+        let mut all = CellSums::default();
+        let mut levels = LEVELS.map(|side| vec![CellSums::default(); side * side * side * SIDES]);
+        for record in &records {
+            let radiance = record.radiance.clamp(0.0, MAX_RADIANCE * mean);
+            all.add(radiance, record.rays);
+            let cell = grid.cell(record.p, record.n) as usize;
+            for (level, sums) in levels.iter_mut().enumerate() {
+                sums[cell_of_level(cell, level)].add(radiance, record.rays);
+            }
+        }
+        let overall = [all.squared / all.count, all.rays / all.count];
+        let root = |cell: usize| {
+            let means = (0..LEVELS.len()).fold(overall, |prior, k| levels[k][cell_of_level(cell, k)].means(prior));
+            (means[0] / means[1].max(1.0)).sqrt() as f32
+        };
+        grid.roots = (0..levels[2].len()).map(root).collect();
+        Some(grid)
+    }
+
+    /// Multiplies all roots.
+    pub fn scale(&mut self, factor: f32) {
+        self.roots.iter_mut().for_each(|root| *root *= factor);
+    }
+
+    /// The roots at the first `count` points, whose normals are turned to the side on which `cos_side` is positive.
+    pub(super) fn find(&self, points: &DVec3Rows, normals: &Vec3Rows, cos_side: &Row, roots: &mut Row, count: usize) {
+        let mut cells = [0; BATCH];
+        vectorize!(find_cells(self, points, normals, cos_side, &mut cells));
+        for (root, &cell) in roots.iter_mut().zip(&cells).take(count) {
+            *root = self.roots[cell as usize];
+        }
+    }
+
+    /// The cell and side of a point, nearest to it where the grid has ended.
+    #[inline(always)]
+    fn cell(&self, p: Vec3, n: Vec3) -> u32 {
+        const LAST: f32 = (LEVELS[2] - 1) as f32;
+        // NaN becomes 0.
+        let at = |k: usize| ((p[k] - self.corner[k]) * self.cells_per_unit).max(0.0).min(LAST) as i32;
+        let side = i32::from(n.x < 0.0) | i32::from(n.y < 0.0) << 1 | i32::from(n.z < 0.0) << 2;
+        let side_length = LEVELS[2] as i32;
+        let cell = (at(2) * side_length + at(1)) * side_length + at(0);
+        (cell * SIDES as i32 + side) as u32
+    }
+}
+
+#[inline(always)]
+fn find_cells(grid: &ContinuationGrid, points: &DVec3Rows, normals: &Vec3Rows, cos_side: &Row, cells: &mut Row<u32>) {
+    for (i, cell) in cells.iter_mut().enumerate() {
+        let n = normals.get(i) * 1f32.copysign(cos_side[i]);
+        *cell = grid.cell(points.get(i).as_vec3(), n);
+    }
+}
+
+/// The cell of a coarser level around a cell of the finest, with the same side.
+fn cell_of_level(cell: usize, level: usize) -> usize {
+    let (side, cell) = (cell % SIDES, cell / SIDES);
+    let (finest, length) = (LEVELS[2], LEVELS[level]);
+    let at = [cell % finest, cell / finest % finest, cell / (finest * finest)].map(|x| x * length / finest);
+    ((at[2] * length + at[1]) * length + at[0]) * SIDES + side
+}
+
+/// The box around all points but a few at its ends.
+fn bounds_without_outliers(records: &[Continuation]) -> Aabb {
+    let mut bounds = Aabb::EMPTY;
+    let outliers = (records.len() as f64 * OUTLIERS) as usize;
+    for k in 0..3 {
+        let mut coordinates: Vec<f32> = records.iter().map(|record| record.p[k]).collect();
+        coordinates.sort_unstable_by(f32::total_cmp);
+        bounds.min[k] = coordinates[outliers];
+        bounds.max[k] = coordinates[coordinates.len() - 1 - outliers];
+    }
+    bounds
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::DVec3;
+
+    fn record(x: f32, up: bool, radiance: f32) -> Continuation {
+        let n = if up { Vec3::Y } else { -Vec3::Y };
+        Continuation { p: Vec3::new(x, 0.0, 0.0), n, radiance, rays: 4.0 }
+    }
+
+    fn found(grid: &ContinuationGrid, x: f32, up: bool) -> f32 {
+        let (mut points, mut normals) = (DVec3Rows::default(), Vec3Rows::default());
+        let (mut cos_side, mut roots) = ([1.0; BATCH], [0.0; BATCH]);
+        points.set(5, DVec3::new(f64::from(x), 0.0, 0.0));
+        normals.set(5, Vec3::Y);
+        cos_side[5] = if up { 0.7 } else { -0.7 };
+        grid.find(&points, &normals, &cos_side, &mut roots, 6);
+        roots[5]
+    }
+
+    #[test]
+    fn the_grid_has_the_root_of_squared_radiance_over_rays_by_place_and_side() {
+        let places = || (0..4000).map(|i| (i % 40) as f32 / 40.0);
+        let bright = places().map(|x| record(x, true, if x < 0.5 { 3.0 } else { 1.0 }));
+        let records: Vec<Continuation> = bright.chain(places().map(|x| record(x, false, 0.5))).collect();
+        let grid = ContinuationGrid::new(&records).unwrap();
+        // A cell has about 100 records, and 8 of the cell above.
+        for (x, up, radiance) in [(0.1, true, 3.0), (0.9, true, 1.0), (0.1, false, 0.5), (0.9, false, 0.5)] {
+            assert!((found(&grid, x, up) / (radiance / 2.0) - 1.0).abs() < 0.15, "{x} {up}: {}", found(&grid, x, up));
+        }
+        // Outside of the grid its nearest cell counts.
+        assert_eq!(found(&grid, -1e9, true), found(&grid, 0.0, true));
+        assert_eq!(found(&grid, f32::NAN, true), found(&grid, 0.0, true));
+        let mut scaled = grid.clone();
+        scaled.scale(2.0);
+        assert_eq!(found(&scaled, 0.3, true), 2.0 * found(&grid, 0.3, true));
+    }
+
+    #[test]
+    fn without_light_there_is_no_grid() {
+        assert!(ContinuationGrid::new(&[]).is_none());
+        assert!(ContinuationGrid::new(&[record(0.0, true, 0.0)]).is_none());
+        assert!(ContinuationGrid::new(&[record(0.0, true, f32::NAN), record(0.0, true, f32::INFINITY)]).is_none());
+        assert!(ContinuationGrid::new(&[record(0.0, true, 1.0)]).is_some());
+    }
+
+    #[test]
+    fn roulette_begins_where_it_is_to() {
+        let least = |roulette: Roulette, bounce, known| roulette.range(bounce, known).least;
+        assert_eq!([0, 100].map(|bounce| least(Roulette::Off, bounce, true)), [1.0, 1.0]);
+        assert_eq!([1, 2].map(|bounce| least(Roulette::Throughput { from: 3 }, bounce, false)), [1.0, 0.0]);
+        assert_eq!([3, 4].map(|bounce| least(Roulette::Auto, bounce, false)), [1.0, 0.0]);
+        let range = Roulette::Auto.range(0, true);
+        assert_eq!([0.01, 0.3, 4.0].map(|throughput| range.probability(throughput, 1.0)), [MIN_SURVIVAL, 0.3, 1.0]);
+    }
+}

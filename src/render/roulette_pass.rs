@@ -1,0 +1,256 @@
+//! The pilot of Russian roulette: a few samples from all over the picture, by which the value of pixels and what paths
+//! find after each scattering are estimated. It depends on the scene, the view and the seed alone.
+
+use std::sync::{Mutex, PoisonError};
+
+use rayon::prelude::*;
+
+use super::TILE_SIZE;
+use super::tile_renderer::{TileRenderer, TileWorkspace};
+use crate::integrator::{Continuation, ContinuationGrid, RayCounts, dimensions};
+use crate::math::Vec2;
+use crate::math::rows::Row;
+use crate::sampling::PixelSeed;
+
+/// Pilot pixels, by pixel of the picture; each has two samples.
+const PILOTS_PER_PIXEL: f64 = 1.0 / 16.0;
+
+/// The fewest and the most of them.
+const PILOTS: [f64; 2] = [1024.0, 65_536.0];
+
+/// Pilot pixels along the side of a cell of the picture's estimate.
+const CELL_SIDE: u32 = 4;
+
+/// Pixels darker than this part of the picture's mean get no more samples for it: nobody sees the noise there.
+const DARKEST: f32 = 0.25;
+
+/// A sample counts with this many times the picture's mean at most, and its relative squared error with as much.
+const BRIGHTEST: f32 = 20.0;
+
+/// What the pilot of a picture has found.
+pub(super) struct RouletteEstimates {
+    pub continuations: ContinuationGrid,
+    pixels: PixelScales,
+}
+
+/// Pixels of the pilot, evenly spread over the picture.
+#[derive(Clone, Copy)]
+struct PilotGrid {
+    view: [u32; 2],
+    /// Columns and rows, multiples of [`CELL_SIDE`].
+    size: [u32; 2],
+}
+
+impl PilotGrid {
+    fn new(view: [u32; 2]) -> Self {
+        let [width, height] = view.map(f64::from);
+        let count = (PILOTS_PER_PIXEL * width * height).clamp(PILOTS[0], PILOTS[1]);
+        let columns = (count * width / height).sqrt();
+        let side = |x: f64| ((x / f64::from(CELL_SIDE)).round() as u32).clamp(1, 1024) * CELL_SIDE;
+        Self { view, size: [side(columns), side(count / columns)] }
+    }
+
+    fn count(self) -> u32 {
+        self.size[0] * self.size[1]
+    }
+
+    /// A point of the film within the pilot pixel `i`, from numbers in `[0, 1)`.
+    fn point(self, i: u32, u: [f32; 2]) -> Vec2 {
+        let at = |k: usize, cell: u32| (cell as f32 + u[k]) / self.size[k] as f32 * self.view[k] as f32;
+        Vec2::new(at(0, i % self.size[0]), at(1, i / self.size[0]))
+    }
+}
+
+/// One over the values of pixels, by cell of the picture.
+struct PixelScales {
+    /// Columns and rows.
+    size: [u32; 2],
+    cells_per_pixel: Vec2,
+    scales: Vec<f32>,
+}
+
+impl PixelScales {
+    /// Between the centres of cells.
+    #[inline(always)]
+    fn at(&self, [x, y]: [u32; 2]) -> f32 {
+        let [last_x, last_y] = self.size.map(|count| (count - 1) as f32);
+        // Beyond the left and the upper edge of the view coordinates wrap.
+        let at = |x: u32, scale: f32, last: f32| ((x as i32 as f32 + 0.5) * scale - 0.5).clamp(0.0, last);
+        let (x, y) = (at(x, self.cells_per_pixel.x, last_x), at(y, self.cells_per_pixel.y, last_y));
+        let (column, row) = (x as usize, y as usize);
+        let (fx, fy) = (x - column as f32, y - row as f32);
+        let columns = self.size[0] as usize;
+        let right = usize::from(x < last_x);
+        let below = if y < last_y { columns } else { 0 };
+        let first = row * columns + column;
+        let of_row = |i: usize| self.scales[i] + fx * (self.scales[i + right] - self.scales[i]);
+        of_row(first) + fy * (of_row(first + below) - of_row(first))
+    }
+}
+
+/// The largest channels of the two samples of each pilot pixel, and what their paths found.
+#[derive(Default)]
+struct PilotSamples {
+    values: Vec<[f32; 2]>,
+    continuations: Vec<Continuation>,
+    counts: RayCounts,
+}
+
+impl RouletteEstimates {
+    /// Traces the pilot of a picture; `None` if it is black. Also the rays traced.
+    pub fn new(renderer: &TileRenderer, workspaces: &[Mutex<TileWorkspace>]) -> (Option<Self>, RayCounts) {
+        let grid = PilotGrid::new(renderer.view);
+        let chunk = TILE_SIZE * TILE_SIZE / 2;
+        let parts: Vec<PilotSamples> = (0..grid.count().div_ceil(chunk))
+            .into_par_iter()
+            .map(|i| {
+                let thread = rayon::current_thread_index().unwrap_or(0) % workspaces.len();
+                let mut workspace = workspaces[thread].lock().unwrap_or_else(PoisonError::into_inner);
+                trace(renderer, grid, i * chunk..((i + 1) * chunk).min(grid.count()), &mut workspace)
+            })
+            .collect();
+        let mut all = PilotSamples::default();
+        for part in parts {
+            all.values.extend(part.values);
+            all.continuations.extend(part.continuations);
+            all.counts.add(&part.counts);
+        }
+        let counts = all.counts;
+        (Self::from_samples(grid, &all), counts)
+    }
+
+    fn from_samples(grid: PilotGrid, samples: &PilotSamples) -> Option<Self> {
+        let count = samples.values.len() as f64;
+        let sum = samples.values.as_flattened().iter().map(|&value| f64::from(value)).sum::<f64>();
+        let mean = (0.5 * sum / count) as f32;
+        if !(mean > 0.0 && mean < f32::INFINITY) {
+            return None;
+        }
+        let mut continuations = ContinuationGrid::new(&samples.continuations)?;
+        let values = blurred(&cell_means(grid, &samples.values, BRIGHTEST * mean), grid.size[0] / CELL_SIDE);
+        let scales: Vec<f32> = values.iter().map(|&value| 1.0 / value.hypot(DARKEST * mean)).collect();
+        let error = |(i, &[a, b]): (usize, &[f32; 2])| {
+            let relative = (a - b) * scales[cell_of(grid, i)];
+            f64::from((0.5 * relative * relative).min(BRIGHTEST))
+        };
+        let variance = samples.values.iter().enumerate().map(error).sum::<f64>() / count;
+        let rays = samples.counts.total() as f64 / (2.0 * count);
+        // Of all paths, error times cost is least where that of going on is in this proportion to its cost.
+        continuations.scale((rays / variance.max(f64::MIN_POSITIVE)).sqrt().min(1e6) as f32);
+        let size = grid.size.map(|side| side / CELL_SIDE);
+        let cells_per_pixel = Vec2::new(size[0] as f32 / grid.view[0] as f32, size[1] as f32 / grid.view[1] as f32);
+        Some(Self { continuations, pixels: PixelScales { size, cells_per_pixel, scales } })
+    }
+
+    /// Sets what roulette multiplies the throughputs of the paths of pixels by.
+    pub fn set_scales(&self, pixels: &[[u32; 2]], scales: &mut Row) {
+        for (scale, &pixel) in scales.iter_mut().zip(pixels) {
+            *scale = self.pixels.at(pixel);
+        }
+    }
+}
+
+/// Traces two samples of each of these pilot pixels.
+fn trace(
+    renderer: &TileRenderer,
+    grid: PilotGrid,
+    pilots: std::ops::Range<u32>,
+    workspace: &mut TileWorkspace,
+) -> PilotSamples {
+    let mut ids = pilots.flat_map(|i| {
+        // Beyond all pixels.
+        let seed = renderer.sampler.pixel(i, u32::MAX - 1);
+        [(i, seed, 0), (i, seed, 1)]
+    });
+    let point = |(i, seed): (u32, PixelSeed)| {
+        // Both samples have the same place, or edges would count as noise.
+        let u = renderer.sampler.sample_4d(seed, 0, dimensions::CAMERA);
+        grid.point(i, [u[0], u[1]])
+    };
+    let mut samples = PilotSamples::default();
+    renderer.trace_pilot(&mut ids, point, workspace, &mut samples.continuations);
+    let count = workspace.sample_count();
+    let value = |slot: usize| workspace.radiance(slot).into_iter().fold(0.0, f64::max) as f32;
+    let finite = |value: f32| if value < f32::INFINITY { value } else { 0.0 };
+    samples.values = (0..count / 2).map(|i| [2 * i, 2 * i + 1].map(|slot| finite(value(slot)))).collect();
+    samples.counts = std::mem::take(&mut workspace.integrator.counts);
+    samples
+}
+
+/// The cell of a pilot pixel.
+fn cell_of(grid: PilotGrid, i: usize) -> usize {
+    let [columns, _] = grid.size.map(|x| x as usize);
+    let side = CELL_SIDE as usize;
+    (i / columns / side) * (columns / side) + i % columns / side
+}
+
+/// The mean of each cell, of values cut off above `most`.
+fn cell_means(grid: PilotGrid, values: &[[f32; 2]], most: f32) -> Vec<f32> {
+    let [columns, rows] = grid.size.map(|x| (x / CELL_SIDE) as usize);
+    let mut means = vec![0.0; columns * rows];
+    let weight = 0.5 / (CELL_SIDE * CELL_SIDE) as f32;
+    for (i, &[a, b]) in values.iter().enumerate() {
+        means[cell_of(grid, i)] += weight * (a.min(most) + b.min(most));
+    }
+    means
+}
+
+/// Each cell with weight 1/2, and those beside, above and below with 1/4, along both axes.
+fn blurred(cells: &[f32], columns: u32) -> Vec<f32> {
+    let columns = columns as usize;
+    let rows = cells.len() / columns;
+    let near = |i: usize, count: usize| [i.saturating_sub(1), i, i, (i + 1).min(count - 1)];
+    let along = |cells: &[f32], at: &dyn Fn(usize, usize) -> [usize; 4]| -> Vec<f32> {
+        (0..rows * columns)
+            .map(|i| at(i % columns, i / columns).iter().map(|&k| 0.25 * cells[k]).sum())
+            .collect()
+    };
+    let across = along(cells, &|x, y| near(x, columns).map(|x| y * columns + x));
+    along(&across, &|x, y| near(y, rows).map(|y| y * columns + x))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pilots_cover_pictures_of_any_shape() {
+        for view in [[1, 1], [512, 512], [1920, 1080], [7, 3000], [65_536, 1]] {
+            let grid = PilotGrid::new(view);
+            assert!(grid.count() >= 16 && grid.count() <= 80_000, "{view:?} {:?}", grid.size);
+            for i in [0, grid.count() - 1] {
+                let p = grid.point(i, [0.5, 0.5]);
+                assert!(p.x > 0.0 && p.x < view[0] as f32 && p.y > 0.0 && p.y < view[1] as f32);
+                assert!(cell_of(grid, i as usize) < (grid.count() / (CELL_SIDE * CELL_SIDE)) as usize);
+            }
+        }
+    }
+
+    #[test]
+    fn scales_are_those_of_cells_at_their_centres_and_lie_between_elsewhere() {
+        let pixels = PixelScales {
+            size: [2, 2],
+            cells_per_pixel: Vec2::new(0.2, 0.2),
+            scales: vec![1.0, 2.0, 3.0, 4.0],
+        };
+        assert_eq!([[2, 2], [7, 2], [2, 7], [7, 7]].map(|at| pixels.at(at)), [1.0, 2.0, 3.0, 4.0]);
+        assert!((pixels.at([4, 2]) - 1.4).abs() < 1e-6 && (pixels.at([2, 4]) - 1.8).abs() < 1e-6);
+        assert_eq!([[u32::MAX, 0], [100, 100], [0, 100]].map(|at| pixels.at(at)), [1.0, 4.0, 3.0]);
+    }
+
+    #[test]
+    fn blurring_keeps_the_sum_of_inner_cells_and_even_pictures() {
+        assert!(blurred(&[2.0; 12], 4).iter().all(|&x| (x - 2.0).abs() < 1e-6));
+        let mut cells = vec![0.0; 25];
+        cells[12] = 16.0;
+        let blurred = blurred(&cells, 5);
+        assert_eq!([blurred[12], blurred[11], blurred[6], blurred[10]], [4.0, 2.0, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn a_black_pilot_estimates_nothing() {
+        let grid = PilotGrid::new([64, 64]);
+        let samples = PilotSamples { values: vec![[0.0; 2]; grid.count() as usize], ..PilotSamples::default() };
+        assert!(RouletteEstimates::from_samples(grid, &samples).is_none());
+    }
+}
