@@ -12,20 +12,28 @@ use crate::math::Vec2;
 use crate::math::rows::Row;
 use crate::sampling::PixelSeed;
 
-/// Pilot pixels, by pixel of the picture; each has two samples.
-const PILOTS_PER_PIXEL: f64 = 1.0 / 16.0;
+/// Pilot pixels, by pixel of the picture.
+const PILOTS_PER_PIXEL: f64 = 1.0 / 128.0;
 
 /// The fewest and the most of them.
-const PILOTS: [f64; 2] = [1024.0, 65_536.0];
+const PILOTS: [f64; 2] = [256.0, 8192.0];
+
+/// Samples of a pilot pixel: two groups of as many, independent of each other. Within a group samples are as well spread
+/// as those of the picture.
+const GROUP: u32 = 8;
 
 /// Pilot pixels along the side of a cell of the picture's estimate.
-const CELL_SIDE: u32 = 4;
+const CELL_SIDE: u32 = 2;
 
-/// Pixels darker than this part of the picture's mean get no more samples for it: nobody sees the noise there.
+/// Below this part of the picture's median, pixels are the less important the darker they are.
 const DARKEST: f32 = 0.25;
 
-/// A sample counts with this many times the picture's mean at most, and its relative squared error with as much.
-const BRIGHTEST: f32 = 20.0;
+/// The largest relative squared error that a sample counts with.
+const LARGEST_ERROR: f64 = 20.0;
+
+/// Paths go on this many times as often as the variance of groups asks for: many samples spread better than few, and
+/// roulette undoes some of it. Errors times rays on three interiors are least between 1 and 2.
+const SURVIVAL_SCALE: f32 = 1.5;
 
 /// What the pilot of a picture has found.
 pub(super) struct RouletteEstimates {
@@ -88,7 +96,7 @@ impl PixelScales {
     }
 }
 
-/// The largest channels of the two samples of each pilot pixel, and what their paths found.
+/// The mean of the largest channels of the two groups of each pilot pixel, and what their paths found.
 #[derive(Default)]
 struct PilotSamples {
     values: Vec<[f32; 2]>,
@@ -100,7 +108,7 @@ impl RouletteEstimates {
     /// Traces the pilot of a picture; `None` if it is black. Also the rays traced.
     pub fn new(renderer: &TileRenderer, workspaces: &[Mutex<TileWorkspace>]) -> (Option<Self>, RayCounts) {
         let grid = PilotGrid::new(renderer.view);
-        let chunk = TILE_SIZE * TILE_SIZE / 2;
+        let chunk = TILE_SIZE * TILE_SIZE / (2 * GROUP);
         let parts: Vec<PilotSamples> = (0..grid.count().div_ceil(chunk))
             .into_par_iter()
             .map(|i| {
@@ -120,23 +128,22 @@ impl RouletteEstimates {
     }
 
     fn from_samples(grid: PilotGrid, samples: &PilotSamples) -> Option<Self> {
-        let count = samples.values.len() as f64;
-        let sum = samples.values.as_flattened().iter().map(|&value| f64::from(value)).sum::<f64>();
-        let mean = (0.5 * sum / count) as f32;
-        if !(mean > 0.0 && mean < f32::INFINITY) {
-            return None;
-        }
         let mut continuations = ContinuationGrid::new(&samples.continuations)?;
-        let values = blurred(&cell_means(grid, &samples.values, BRIGHTEST * mean), grid.size[0] / CELL_SIDE);
-        let scales: Vec<f32> = values.iter().map(|&value| 1.0 / value.hypot(DARKEST * mean)).collect();
+        let count = samples.values.len() as f64;
+        let values = blurred(&cell_means(grid, &samples.values), grid.size[0] / CELL_SIDE);
+        let mut positive: Vec<f32> = values.iter().copied().filter(|&value| value > 0.0).collect();
+        positive.sort_unstable_by(f32::total_cmp);
+        let median = *positive.get(positive.len() / 2)?;
+        let scales: Vec<f32> = values.iter().map(|&value| 1.0 / value.hypot(DARKEST * median)).collect();
+        // Of one sample, if errors are to fall with their number.
         let error = |(i, &[a, b]): (usize, &[f32; 2])| {
             let relative = (a - b) * scales[cell_of(grid, i)];
-            f64::from((0.5 * relative * relative).min(BRIGHTEST))
+            f64::from(0.5 * GROUP as f32 * relative * relative).min(LARGEST_ERROR)
         };
         let variance = samples.values.iter().enumerate().map(error).sum::<f64>() / count;
-        let rays = samples.counts.total() as f64 / (2.0 * count);
-        // Of all paths, error times cost is least where that of going on is in this proportion to its cost.
-        continuations.scale((rays / variance.max(f64::MIN_POSITIVE)).sqrt().min(1e6) as f32);
+        let rays = samples.counts.total() as f64 / (f64::from(2 * GROUP) * count);
+        // Error times cost is least where going on adds to a path's error and cost in the proportion of all paths.
+        continuations.scale(SURVIVAL_SCALE * (rays / variance.max(f64::MIN_POSITIVE)).sqrt().min(1e6) as f32);
         let size = grid.size.map(|side| side / CELL_SIDE);
         let cells_per_pixel = Vec2::new(size[0] as f32 / grid.view[0] as f32, size[1] as f32 / grid.view[1] as f32);
         Some(Self { continuations, pixels: PixelScales { size, cells_per_pixel, scales } })
@@ -150,29 +157,31 @@ impl RouletteEstimates {
     }
 }
 
-/// Traces two samples of each of these pilot pixels.
+/// Traces the samples of these pilot pixels.
 fn trace(
     renderer: &TileRenderer,
     grid: PilotGrid,
     pilots: std::ops::Range<u32>,
     workspace: &mut TileWorkspace,
 ) -> PilotSamples {
-    let mut ids = pilots.flat_map(|i| {
-        // Beyond all pixels.
-        let seed = renderer.sampler.pixel(i, u32::MAX - 1);
-        [(i, seed, 0), (i, seed, 1)]
-    });
-    let point = |(i, seed): (u32, PixelSeed)| {
-        // Both samples have the same place, or edges would count as noise.
-        let u = renderer.sampler.sample_4d(seed, 0, dimensions::CAMERA);
+    // Beyond all pixels.
+    let seed = |i: u32, group: u32| renderer.sampler.pixel(i, u32::MAX - 1 - group);
+    let mut ids =
+        pilots.flat_map(|i| (0..2 * GROUP).map(move |k| (i, k))).map(|(i, k)| (i, seed(i, k / GROUP), k % GROUP));
+    let point = |(i, _): (u32, PixelSeed)| {
+        // All samples have the same place, or edges would count as noise.
+        let u = renderer.sampler.sample_4d(seed(i, 2), 0, dimensions::CAMERA);
         grid.point(i, [u[0], u[1]])
     };
     let mut samples = PilotSamples::default();
     renderer.trace_pilot(&mut ids, point, workspace, &mut samples.continuations);
-    let count = workspace.sample_count();
-    let value = |slot: usize| workspace.radiance(slot).into_iter().fold(0.0, f64::max) as f32;
-    let finite = |value: f32| if value < f32::INFINITY { value } else { 0.0 };
-    samples.values = (0..count / 2).map(|i| [2 * i, 2 * i + 1].map(|slot| finite(value(slot)))).collect();
+    let value = |slot: usize| {
+        let value = workspace.radiance(slot).into_iter().fold(0.0, f64::max) as f32;
+        if value < f32::INFINITY { value } else { 0.0 }
+    };
+    let group = GROUP as usize;
+    let mean = |k: usize| (k * group..(k + 1) * group).map(value).sum::<f32>() / GROUP as f32;
+    samples.values = (0..workspace.sample_count() / (2 * group)).map(|i| [mean(2 * i), mean(2 * i + 1)]).collect();
     samples.counts = std::mem::take(&mut workspace.integrator.counts);
     samples
 }
@@ -184,13 +193,13 @@ fn cell_of(grid: PilotGrid, i: usize) -> usize {
     (i / columns / side) * (columns / side) + i % columns / side
 }
 
-/// The mean of each cell, of values cut off above `most`.
-fn cell_means(grid: PilotGrid, values: &[[f32; 2]], most: f32) -> Vec<f32> {
+/// The mean of each cell.
+fn cell_means(grid: PilotGrid, values: &[[f32; 2]]) -> Vec<f32> {
     let [columns, rows] = grid.size.map(|x| (x / CELL_SIDE) as usize);
     let mut means = vec![0.0; columns * rows];
     let weight = 0.5 / (CELL_SIDE * CELL_SIDE) as f32;
     for (i, &[a, b]) in values.iter().enumerate() {
-        means[cell_of(grid, i)] += weight * (a.min(most) + b.min(most));
+        means[cell_of(grid, i)] += weight * (a + b);
     }
     means
 }
@@ -201,9 +210,7 @@ fn blurred(cells: &[f32], columns: u32) -> Vec<f32> {
     let rows = cells.len() / columns;
     let near = |i: usize, count: usize| [i.saturating_sub(1), i, i, (i + 1).min(count - 1)];
     let along = |cells: &[f32], at: &dyn Fn(usize, usize) -> [usize; 4]| -> Vec<f32> {
-        (0..rows * columns)
-            .map(|i| at(i % columns, i / columns).iter().map(|&k| 0.25 * cells[k]).sum())
-            .collect()
+        (0..rows * columns).map(|i| at(i % columns, i / columns).iter().map(|&k| 0.25 * cells[k]).sum()).collect()
     };
     let across = along(cells, &|x, y| near(x, columns).map(|x| y * columns + x));
     along(&across, &|x, y| near(y, rows).map(|y| y * columns + x))
@@ -228,11 +235,8 @@ mod tests {
 
     #[test]
     fn scales_are_those_of_cells_at_their_centres_and_lie_between_elsewhere() {
-        let pixels = PixelScales {
-            size: [2, 2],
-            cells_per_pixel: Vec2::new(0.2, 0.2),
-            scales: vec![1.0, 2.0, 3.0, 4.0],
-        };
+        let pixels =
+            PixelScales { size: [2, 2], cells_per_pixel: Vec2::new(0.2, 0.2), scales: vec![1.0, 2.0, 3.0, 4.0] };
         assert_eq!([[2, 2], [7, 2], [2, 7], [7, 7]].map(|at| pixels.at(at)), [1.0, 2.0, 3.0, 4.0]);
         assert!((pixels.at([4, 2]) - 1.4).abs() < 1e-6 && (pixels.at([2, 4]) - 1.8).abs() < 1e-6);
         assert_eq!([[u32::MAX, 0], [100, 100], [0, 100]].map(|at| pixels.at(at)), [1.0, 4.0, 3.0]);

@@ -14,8 +14,8 @@ use crate::film::{
 };
 use crate::guiding::Guide;
 use crate::integrator::{
-    self, CameraBatch, CameraBlock, Continuation, Integrator, PassContext, RayCounts, RenderContext, Setup, SurfaceAovs, Workspace,
-    World, dimensions,
+    self, CameraBatch, CameraBlock, Continuation, Integrator, PassContext, RayCounts, RenderContext, Setup,
+    SurfaceAovs, Workspace, World, dimensions,
 };
 use crate::math::Vec2;
 use crate::math::rows::{BATCH, Row, pair};
