@@ -1,17 +1,14 @@
 //! Caustics by photons: the same picture as paths find by chance, with less noise, and the same bits however a render
 //! is split.
 
-use std::sync::atomic::AtomicBool;
-
 use serde_json::{Value, json};
-use steradian::accel::{self, AccelKind};
+use steradian::accel::AccelKind;
 use steradian::desc::CausticsDesc;
 use steradian::error::Error;
 use steradian::film::{Image, LayerKind};
-use steradian::math::Rng;
-use steradian::render::{self, Overrides, Shard, StateFile};
+use steradian::render::{self, Overrides};
 
-use crate::checkpoints::{Kit, StopAfter, bits};
+use crate::checkpoints::assert_resumed_split_and_replayed;
 use crate::util::render::{assert_blocks_agree, block_means, prepare, render_with};
 
 /// A floor and a wall beside these shapes, lit by a lamp so large that paths meet it.
@@ -189,36 +186,7 @@ fn scenes_without_mirrors_and_glass_stay_what_they_are() {
 fn renders_with_photons_are_resumed_split_and_replayed() {
     let overrides =
         Overrides { caustics: Some(CausticsDesc::Photons), spp: Some(21), threads: Some(2), ..Overrides::default() };
-    let kit = Kit::new(&balls(), &overrides);
-    let whole = kit.render(Shard::WHOLE);
-    let folder = tempfile::tempdir().unwrap();
-    let file = StateFile::take(&folder.path().join("a.state")).unwrap();
-    let mut rng = Rng::new(3);
-    let mut state = kit.start(Shard::WHOLE);
-    while !state.complete {
-        let stop = AtomicBool::new(false);
-        let progress = StopAfter { tiles: (1 + rng.below(5) as u32).into(), stop: &stop };
-        state = kit.kept(&kit.go_on(state, &progress, &stop), &file);
-    }
-    assert!(bits(&state.film) == bits(&whole.film));
-
-    let shards = (1..=3).map(|index| Shard { index, count: 3 });
-    let paths = shards.map(|shard| {
-        let path = folder.path().join(format!("{}.shard", shard.index));
-        kit.kept(&kit.render(shard), &StateFile::take(&path).unwrap());
-        path
-    });
-    let paths: Vec<_> = paths.collect();
-    let merged = render::merge(&paths, false).unwrap();
-    assert!(merged.state.film.resolve() == whole.film.resolve());
-
-    let accel = accel::build(AccelKind::EMBREE, &kit.prepared.scene.geometry, 1).unwrap();
-    let replay =
-        |sample| render::replay(&kit.prepared.scene, &*accel, &kit.prepared.settings, [17, 20], sample).unwrap().pixel;
-    let single = Kit::new(&balls(), &Overrides { crop: Some([17, 20, 1, 1]), ..overrides });
-    let mean = (0..21).map(|i| f64::from(replay(i).radiance.r)).sum::<f64>() / 21.0;
-    let of_picture = f64::from(single.render(Shard::WHOLE).film.resolve().pixel(LayerKind::Color, 17, 20).unwrap()[0]);
-    assert!((mean / of_picture - 1.0).abs() < 1e-5, "{mean} {of_picture}");
+    assert_resumed_split_and_replayed(&balls(), &overrides);
 }
 
 #[test]

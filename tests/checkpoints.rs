@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 use steradian::accel::{self, AccelKind};
-use steradian::film::{Film, LayerSet};
+use steradian::film::{Film, LayerKind, LayerSet};
 use steradian::import::SceneFingerprint;
 use steradian::math::Rng;
 use steradian::render::{
@@ -92,6 +92,44 @@ impl Kit {
 /// Every bit of a film.
 pub fn bits(film: &Film) -> Vec<Vec<u8>> {
     film.tiles().iter().map(steradian::film::FilmTile::save).collect()
+}
+
+/// Asserts that a render of box-filtered pixels keeps its bits when it is stopped and resumed many times, that three
+/// shards make the same picture, and that the samples of a pixel, replayed one by one, have its mean.
+#[track_caller]
+pub fn assert_resumed_split_and_replayed(scene: &Value, overrides: &Overrides) {
+    let kit = Kit::new(scene, overrides);
+    let whole = kit.render(Shard::WHOLE);
+    let folder = tempfile::tempdir().unwrap();
+    let file = StateFile::take(&folder.path().join("a.state")).unwrap();
+    let mut rng = Rng::new(3);
+    let mut state = kit.start(Shard::WHOLE);
+    while !state.complete {
+        let stop = AtomicBool::new(false);
+        let progress = StopAfter { tiles: (1 + rng.below(5) as u32).into(), stop: &stop };
+        state = kit.kept(&kit.go_on(state, &progress, &stop), &file);
+    }
+    assert!(bits(&state.film) == bits(&whole.film));
+
+    let shards = (1..=3).map(|index| Shard { index, count: 3 });
+    let paths = shards.map(|shard| {
+        let path = folder.path().join(format!("{}.shard", shard.index));
+        kit.kept(&kit.render(shard), &StateFile::take(&path).unwrap());
+        path
+    });
+    let paths: Vec<_> = paths.collect();
+    let merged = render::merge(&paths, false).unwrap();
+    assert!(merged.state.film.resolve() == whole.film.resolve());
+
+    let accel = accel::build(AccelKind::EMBREE, &kit.prepared.scene.geometry, 1).unwrap();
+    let replay =
+        |sample| render::replay(&kit.prepared.scene, &*accel, &kit.prepared.settings, [17, 20], sample).unwrap().pixel;
+    let single = Kit::new(scene, &Overrides { crop: Some([17, 20, 1, 1]), ..overrides.clone() });
+    let spp = kit.prepared.settings.spp;
+    let mean = (0..spp).map(|i| f64::from(replay(i).radiance.r)).sum::<f64>() / f64::from(spp);
+    let of_crop = single.render(Shard::WHOLE).film.resolve().pixel(LayerKind::Color, 17, 20).unwrap()[0];
+    assert_eq!(whole.film.resolve().pixel(LayerKind::Color, 17, 20).unwrap()[0], of_crop);
+    assert!((mean / f64::from(of_crop) - 1.0).abs() < 1e-5, "{mean} {of_crop}");
 }
 
 fn spp(spp: u32) -> Overrides {

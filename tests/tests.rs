@@ -101,6 +101,8 @@ mod own_accelerators;
 mod planes;
 /// Normal maps, bump maps and smooth normals, without leaks and black rims.
 mod relief;
+/// Russian roulette by what paths are worth.
+mod roulette;
 /// Scenes far too small, too large or too far away for 32-bit coordinates.
 mod scale;
 /// Meshes, comments, names and transforms of scene files, read as users write them.

@@ -21,38 +21,40 @@ pub enum Roulette {
     Auto,
 }
 
-/// The least probability of going on that estimates lead to: no path becomes more than 10 times as bright by a wrong
-/// one.
-const MIN_SURVIVAL: f32 = 0.1;
+/// With estimates, a path goes on with at least this part of what scattering has left of it: wrong estimates cannot
+/// make it much brighter at once.
+const LEAST_SHARE: f32 = 0.75;
 
-/// The probability of going on: the throughput times its scale, within these limits.
+/// With which probability paths go on.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct SurvivalRange {
-    /// 1 where there is no roulette.
-    pub least: f32,
+pub(super) struct SurvivalRule {
+    /// At least this. 1 where there is no roulette.
+    least: f32,
+    /// At least this part of what the last scattering has left.
+    least_share: f32,
 }
 
-impl SurvivalRange {
-    /// Probability with which Russian roulette lets a path go on.
+impl SurvivalRule {
+    /// The probability for a path that is worth `value`, of which the last scattering has left `kept`.
     #[inline(always)]
-    pub fn probability(self, max_throughput: f32, scale: f32) -> f32 {
-        let share = max_throughput * scale;
+    pub fn probability(self, value: f32, kept: f32) -> f32 {
+        let least = self.least + self.least_share * kept;
         // NaN becomes 1: it must be seen in the sample.
-        let share = if share < self.least { self.least } else { share };
-        share.min(1.0)
+        let probability = if value < least { least } else { value };
+        probability.min(1.0)
     }
 }
 
 impl Roulette {
-    /// The range of probabilities after `bounce` scatterings.
-    pub(super) fn range(self, bounce: u32, has_estimates: bool) -> SurvivalRange {
+    /// The rule after `bounce` scatterings.
+    pub(super) fn rule(self, bounce: u32, has_estimates: bool) -> SurvivalRule {
         let from = match self {
             Self::Off => u32::MAX,
             Self::Throughput { from } => from,
-            Self::Auto if has_estimates => return SurvivalRange { least: MIN_SURVIVAL },
+            Self::Auto if has_estimates => return SurvivalRule { least: 0.0, least_share: LEAST_SHARE },
             Self::Auto => DEFAULT_RR_DEPTH,
         };
-        SurvivalRange { least: if bounce + 1 >= from { 0.0 } else { 1.0 } }
+        SurvivalRule { least: if bounce + 1 >= from { 0.0 } else { 1.0 }, least_share: 0.0 }
     }
 }
 
@@ -169,7 +171,7 @@ impl ContinuationGrid {
     fn cell(&self, p: Vec3, n: Vec3) -> u32 {
         const LAST: f32 = (LEVELS[2] - 1) as f32;
         // NaN becomes 0.
-        let at = |k: usize| ((p[k] - self.corner[k]) * self.cells_per_unit).max(0.0).min(LAST) as i32;
+        let at = |k: usize| ((p[k] - self.corner[k]) * self.cells_per_unit).clamp(0.0, LAST) as i32;
         let side = i32::from(n.x < 0.0) | i32::from(n.y < 0.0) << 1 | i32::from(n.z < 0.0) << 2;
         let side_length = LEVELS[2] as i32;
         let cell = (at(2) * side_length + at(1)) * side_length + at(0);
@@ -217,7 +219,7 @@ mod tests {
     }
 
     fn found(grid: &ContinuationGrid, x: f32, up: bool) -> f32 {
-        let (mut points, mut normals) = (DVec3Rows::default(), Vec3Rows::default());
+        let (mut points, mut normals) = (DVec3Rows([[0.0; BATCH]; 3]), Vec3Rows([[0.0; BATCH]; 3]));
         let (mut cos_side, mut roots) = ([1.0; BATCH], [0.0; BATCH]);
         points.set(5, DVec3::new(f64::from(x), 0.0, 0.0));
         normals.set(5, Vec3::Y);
@@ -254,11 +256,12 @@ mod tests {
 
     #[test]
     fn roulette_begins_where_it_is_to() {
-        let least = |roulette: Roulette, bounce, known| roulette.range(bounce, known).least;
-        assert_eq!([0, 100].map(|bounce| least(Roulette::Off, bounce, true)), [1.0, 1.0]);
-        assert_eq!([1, 2].map(|bounce| least(Roulette::Throughput { from: 3 }, bounce, false)), [1.0, 0.0]);
-        assert_eq!([3, 4].map(|bounce| least(Roulette::Auto, bounce, false)), [1.0, 0.0]);
-        let range = Roulette::Auto.range(0, true);
-        assert_eq!([0.01, 0.3, 4.0].map(|throughput| range.probability(throughput, 1.0)), [MIN_SURVIVAL, 0.3, 1.0]);
+        let dim = |roulette: Roulette, bounce, known| roulette.rule(bounce, known).probability(0.01, 0.2);
+        assert_eq!([0, 100].map(|bounce| dim(Roulette::Off, bounce, true)), [1.0, 1.0]);
+        assert_eq!([1, 2].map(|bounce| dim(Roulette::Throughput { from: 3 }, bounce, false)), [1.0, 0.01]);
+        assert_eq!([3, 4].map(|bounce| dim(Roulette::Auto, bounce, false)), [1.0, 0.01]);
+        let rule = Roulette::Auto.rule(0, true);
+        assert_eq!([0.01, 0.3, 4.0].map(|value| rule.probability(value, 0.2)), [LEAST_SHARE * 0.2, 0.3, 1.0]);
+        assert_eq!(rule.probability(f32::NAN, 0.2), 1.0);
     }
 }

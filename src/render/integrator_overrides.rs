@@ -58,13 +58,13 @@ pub(super) fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<Inte
 
 fn set_roulette(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Result<()> {
     if let Some(chosen) = overrides.roulette {
-        let IntegratorDesc::Path { roulette, rr_depth, max_depth, .. } = integrator else {
+        let IntegratorDesc::Path { roulette, rr_depth, .. } = integrator else {
             return Err(usage("--roulette: only the integrator path plays Russian roulette"));
         };
         *roulette = chosen;
-        // Other renderers disable roulette by a depth that no path reaches.
-        if chosen == RouletteDesc::Throughput && *rr_depth >= *max_depth {
-            *rr_depth = DEFAULT_RR_DEPTH;
+        // Scenes of other renderers disable roulette by a depth that no path reaches.
+        if chosen == RouletteDesc::Throughput {
+            *rr_depth = DEFAULT_RR_DEPTH.min(*rr_depth);
         }
     }
     Ok(())

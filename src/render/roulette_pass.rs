@@ -18,8 +18,8 @@ const PILOTS_PER_PIXEL: f64 = 1.0 / 128.0;
 /// The fewest and the most of them.
 const PILOTS: [f64; 2] = [256.0, 8192.0];
 
-/// Samples of a pilot pixel: two groups of as many, independent of each other. Within a group samples are as well spread
-/// as those of the picture.
+/// Samples of a pilot pixel: two groups of as many, independent of each other. Within a group samples are as well
+/// spread as those of the picture.
 const GROUP: u32 = 8;
 
 /// Pilot pixels along the side of a cell of the picture's estimate.

@@ -9,7 +9,7 @@ use super::wave::{BsdfScratch, Wave, path_flags};
 use crate::bsdf::Lambert;
 use crate::geometry::SpawnPoint;
 use crate::guiding::Guide;
-use crate::integrator::roulette::SurvivalRange;
+use crate::integrator::roulette::SurvivalRule;
 use crate::integrator::vertex::HemisphereTest;
 use crate::math::Frame;
 use crate::math::rows::BATCH;
@@ -36,7 +36,7 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
         None => scatter.continuation = [1.0; BATCH],
     }
     let rule = SpawnRule {
-        survival: context.config.roulette.range(context.bounce, continuations.is_some()),
+        survival: context.config.roulette.rule(context.bounce, continuations.is_some()),
         no_lights: context.scene.lights.is_empty(),
     };
     if context.scene.features.normal_perturbations {
@@ -111,7 +111,7 @@ fn sample_diffuse(rows: &VertexRows, scatter: &mut ScatterRows, u: &SampleRows, 
 /// Which of the sampled directions paths take.
 #[derive(Clone, Copy)]
 struct SpawnRule {
-    survival: SurvivalRange,
+    survival: SurvivalRule,
     no_lights: bool,
 }
 
@@ -137,7 +137,8 @@ fn spawn_rays<const PERTURBED: bool>(
 
         let mut throughput = rows.throughput.get(i) * weight;
         let rr_scale = rows.rr_scale[i] * scatter.rr_factor[i];
-        let survival = rule.survival.probability(throughput.max_channel(), rr_scale * scatter.continuation[i]);
+        let value = throughput.max_channel() * rr_scale * scatter.continuation[i];
+        let survival = rule.survival.probability(value, weight.max_channel() * scatter.rr_factor[i]);
         let goes_on = (scatter.is_valid[i] != 0) & ((survival >= 1.0) | (u.of(i)[3] < survival));
         throughput *= if survival < 1.0 { 1.0 / survival } else { 1.0 };
         let goes_on = goes_on & !throughput.is_black();

@@ -1,0 +1,124 @@
+//! Russian roulette by what paths are worth: the same mean as without roulette, less error for the same rays, the
+//! same bits however a render is split.
+
+use serde_json::{Value, json};
+use steradian::accel::AccelKind;
+use steradian::desc::{IntegratorDesc, RouletteDesc};
+use steradian::error::Error;
+use steradian::film::{Image, LayerKind};
+use steradian::render::{Overrides, Settings};
+
+use crate::checkpoints::assert_resumed_split_and_replayed;
+use crate::util::render::{assert_blocks_agree, block_means, prepare, render_with};
+
+fn wall(origin: [f32; 3], edge_u: [f32; 3], edge_v: [f32; 3]) -> Value {
+    json!({ "type": "quad", "material": "white", "origin": origin, "edge_u": edge_u, "edge_v": edge_v })
+}
+
+/// A bright room that a lamp behind a partition lights, with a glass and a glossy ball.
+fn room() -> Value {
+    json!({
+        "camera": { "position": [0, 1, 2.9], "look_at": [0, 0.9, 0], "vertical_fov_degrees": 60 },
+        "film": { "width": 48, "height": 48, "filter": { "type": "box" } },
+        "integrator": { "type": "path", "max_depth": 24, "rr_depth": 64 },
+        "materials": {
+            "white": { "type": "diffuse", "albedo": [0.8, 0.75, 0.7] }, "glass": { "type": "dielectric" },
+            "coat": { "type": "plastic", "albedo": [0.2, 0.4, 0.7], "roughness": 0.3 }
+        },
+        "shapes": [
+            wall([-2.0, 0.0, 3.0], [4.0, 0.0, 0.0], [0.0, 0.0, -6.0]),
+            wall([-2.0, 2.0, 3.0], [4.0, 0.0, 0.0], [0.0, 0.0, -6.0]),
+            wall([-2.0, 0.0, -3.0], [4.0, 0.0, 0.0], [0.0, 2.0, 0.0]),
+            wall([-2.0, 0.0, 3.0], [4.0, 0.0, 0.0], [0.0, 2.0, 0.0]),
+            wall([-2.0, 0.0, 3.0], [0.0, 0.0, -6.0], [0.0, 2.0, 0.0]),
+            wall([2.0, 0.0, 3.0], [0.0, 0.0, -6.0], [0.0, 2.0, 0.0]),
+            wall([-1.2, 0.0, -1.0], [3.2, 0.0, 0.0], [0.0, 2.0, 0.0]),
+            { "type": "sphere", "material": "glass", "radius": 0.4, "transform": [{ "translate": [-0.7, 0.4, 0.5] }] },
+            { "type": "sphere", "material": "coat", "radius": 0.4, "transform": [{ "translate": [0.6, 0.4, 0.3] }] },
+            { "type": "quad", "material": "white", "origin": [0.4, 1.9, -2.6], "edge_u": [1, 0, 0],
+              "edge_v": [0, 0, 1], "emission": { "radiance": [30, 28, 25], "two_sided": true } }
+        ]
+    })
+}
+
+fn overrides(roulette: RouletteDesc, seed: u64, spp: u32) -> Overrides {
+    Overrides { roulette: Some(roulette), seed: Some(seed), spp: Some(spp), ..Overrides::default() }
+}
+
+fn image(scene: &Value, overrides: &Overrides) -> Image {
+    render_with(&prepare(scene, overrides), AccelKind::EMBREE).image
+}
+
+/// By Welch's test on blocks of pixels.
+#[test]
+fn the_mean_is_that_without_roulette() {
+    let blocks = |roulette, first: u64| -> Vec<Vec<f64>> {
+        (first..first + 8).map(|seed| block_means(&image(&room(), &overrides(roulette, seed, 32)))).collect()
+    };
+    let off = blocks(RouletteDesc::Off, 0);
+    assert_blocks_agree(&blocks(RouletteDesc::Auto, 100), &off, "auto");
+    assert_blocks_agree(&blocks(RouletteDesc::Throughput, 200), &off, "throughput");
+}
+
+/// Two renders differ by twice the variance of one.
+#[test]
+fn errors_times_rays_are_less_than_without_roulette() {
+    let cost = |roulette| {
+        let renders = [1, 2].map(|seed| {
+            let rendered = render_with(&prepare(&room(), &overrides(roulette, seed, 64)), AccelKind::EMBREE);
+            (rendered.image, rendered.stats.rays.total() as f64)
+        });
+        let [(a, rays), (b, _)] = &renders;
+        let (a, b) = (a.layer(LayerKind::Color).unwrap(), b.layer(LayerKind::Color).unwrap());
+        let error = |(a, b): (&f32, &f32)| f64::from(a - b).powi(2) / (f64::from(*b).powi(2) + 1e-4);
+        a.data.iter().zip(&b.data).map(error).sum::<f64>() * rays
+    };
+    let (auto, off) = (cost(RouletteDesc::Auto), cost(RouletteDesc::Off));
+    assert!(auto < 0.75 * off, "{auto} {off}");
+}
+
+#[test]
+fn the_bits_do_not_depend_on_threads_or_parts() {
+    let of_threads = |threads| {
+        let overrides = Overrides { threads: Some(threads), ..overrides(RouletteDesc::Auto, 1, 8) };
+        image(&room(), &overrides)
+    };
+    assert!(of_threads(1) == of_threads(3));
+    assert!(of_threads(1) != image(&room(), &overrides(RouletteDesc::Off, 1, 8)));
+    assert_resumed_split_and_replayed(&room(), &overrides(RouletteDesc::Auto, 1, 21));
+}
+
+/// There is nothing to estimate; and no shape is the bound of a grid.
+#[test]
+fn dark_and_empty_scenes_are_rendered() {
+    let mut dark = room();
+    dark["integrator"]["max_depth"] = json!(1);
+    let empty = json!({
+        "camera": { "position": [0, 0, 1], "look_at": [0, 0, 0] },
+        "lights": [{ "type": "environment", "radiance": [1, 2, 3] }]
+    });
+    for (scene, expected) in [(dark, 0.0), (empty, 1.0)] {
+        let image = image(&scene, &overrides(RouletteDesc::Auto, 1, 2));
+        assert_eq!(image.pixel(LayerKind::Color, 10, 10).unwrap()[0], expected);
+    }
+}
+
+#[test]
+fn the_option_replaces_what_the_scene_says() {
+    let settings = |scene: &Value, roulette| {
+        let desc = serde_json::from_value(scene.clone()).unwrap();
+        Settings::new(&desc, &Overrides { roulette, ..Overrides::default() })
+    };
+    let of = |roulette| match settings(&room(), roulette).unwrap().integrator {
+        IntegratorDesc::Path { roulette, rr_depth, .. } => (roulette, rr_depth),
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(of(None), (RouletteDesc::Throughput, 64));
+    assert_eq!(of(Some(RouletteDesc::Throughput)), (RouletteDesc::Throughput, 5));
+    assert_eq!(of(Some(RouletteDesc::Auto)).0, RouletteDesc::Auto);
+    assert_eq!(of(Some(RouletteDesc::Off)).0, RouletteDesc::Off);
+    let mut whitted = room();
+    whitted["integrator"] = json!({ "type": "whitted" });
+    assert!(matches!(settings(&whitted, Some(RouletteDesc::Auto)), Err(Error::Usage(message))
+        if message.starts_with("--roulette")));
+}
