@@ -34,13 +34,14 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use crate::assets::{AssetError, SceneSource};
-use crate::desc::{IntegratorDesc, SceneDesc};
+use crate::desc::{CausticsDesc, IntegratorDesc, SceneDesc};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Shape};
 use crate::id::TextureId;
 use crate::light::LightSet;
 use crate::material::Material;
 use crate::math::{Bounds, RenderSpace};
+use crate::medium::Medium;
 use crate::scene::{Scene, SceneFeatures, Surface};
 use crate::suggestion::did_you_mean;
 use crate::texture::Texture;
@@ -215,6 +216,13 @@ impl Builder {
             || self.surfaces.iter().any(|surface| surface.normal_perturbation.is_some());
         let anisotropic = materials.iter().any(|material| material.flags().is_anisotropic());
         let smooth = |shape: &Shape| matches!(shape, Shape::Mesh(mesh) if mesh.has_normals());
+        let media = &self.materials.media;
+        let has_medium = self.surfaces.iter().filter_map(|surface| surface.medium);
+        let participates =
+            has_medium.clone().map(|id| media.get(id)).chain(media.surroundings()).any(Medium::is_participating);
+        if participates && has_photons(&desc.integrator) {
+            return Err(files.error("integrator.caustics", "photons are not traced through media that scatter"));
+        }
         let features = SceneFeatures {
             lights: !lights.is_empty(),
             environment: sky,
@@ -229,7 +237,8 @@ impl Builder {
             shading_normals: normal_perturbations || self.geometry.shapes.iter().any(smooth),
             parameters: anisotropic || !self.materials.textures.textures.is_empty(),
             delta_materials: materials.iter().any(|material| material.flags().is_delta()),
-            media: self.surfaces.iter().any(|surface| surface.medium.is_some()),
+            media: has_medium.clone().next().is_some() || media.has_surroundings(),
+            participating_media: participates,
             anisotropic,
             lens: camera.lens().is_some(),
             motion: self.geometry.is_moving() || camera.is_moving(),
@@ -249,6 +258,11 @@ impl Builder {
             identities: self.identities.finish(),
         })
     }
+}
+
+/// Whether an integrator traces photons.
+fn has_photons(integrator: &IntegratorDesc) -> bool {
+    matches!(integrator, IntegratorDesc::Path { caustics: CausticsDesc::Photons, .. })
 }
 
 /// Whether an integrator shows nothing without a light.
