@@ -374,6 +374,23 @@ pub struct DielectricDesc {
 }
 
 impl DielectricDesc {
+    /// A smooth boundary that light does not notice, unless there is a medium.
+    pub fn invisible() -> Self {
+        Self {
+            ior: RangedDesc::Constant(1.0),
+            roughness: None,
+            alpha: None,
+            distribution: DistributionDesc::default(),
+            multiscatter: true,
+            reflection_tint: white(),
+            transmission_tint: white(),
+            priority: None,
+            absorption: None,
+            medium: None,
+            abbe: None,
+        }
+    }
+
     /// Whether it is a medium, not a boundary alone.
     pub fn is_medium(&self) -> bool {
         self.priority.is_some() || self.absorption.is_some() || self.medium.is_some() || self.abbe.is_some()
