@@ -182,8 +182,8 @@ fn single_scattering_in_fog_is_the_quadrature() {
 
 #[test]
 fn single_scattering_in_a_slab_passes_its_boundaries() {
-    // Light comes down through the slab's face, which bends nothing, and leaves it again; a distant light is a delta, so
-    // only shadow rays through the boundary find it.
+    // Light comes down through the slab's face, which bends nothing, and leaves it again; a distant light is a delta,
+    // so only shadow rays through the boundary find it.
     let (g, cos) = (0.3, 0.8f64);
     let sin = (1.0 - cos * cos).sqrt();
     for angle in [0.0, 1.0] {

@@ -14,6 +14,12 @@ const UNSUPPORTED: &str = "only homogeneous participating media are supported: l
 
 const UNSEEN: &str = "the integrator shows no participating media: left out";
 
+/// The media on both sides of a shape.
+pub(super) struct MediumInterface {
+    pub inside: Option<String>,
+    pub outside: Option<String>,
+}
+
 impl<'a> Reader<'a> {
     /// Whether the scene's integrator shows media.
     pub(super) fn shows_media(&self) -> bool {
@@ -117,31 +123,50 @@ impl<'a> Reader<'a> {
         Ok(phase)
     }
 
-    /// The material of the surface of a medium, whose BSDF has become `material`; `None` if nothing of the medium can
-    /// be seen.
-    pub(super) fn container(&mut self, bsdf: Option<PluginId>, material: &str, medium: &str) -> Option<String> {
+    /// The material of a surface between media, whose BSDF has become `material`; `None` where media change nothing.
+    pub(super) fn container(
+        &mut self,
+        bsdf: Option<PluginId>,
+        material: &str,
+        interface: &MediumInterface,
+    ) -> Option<String> {
+        let MediumInterface { inside, outside } = interface;
+        let is_null = bsdf.is_some_and(|id| self.document.plugins[id.0].kind == "null");
         let desc = match self.draft.desc.materials.get(material) {
-            _ if bsdf.is_some_and(|id| self.document.plugins[id.0].kind == "null") => DielectricDesc::invisible(),
+            _ if inside.is_none() && outside.is_none() => return None,
+            _ if is_null => DielectricDesc::invisible(),
             Some(MaterialDesc::Dielectric(glass)) => (**glass).clone(),
             _ => return None,
         };
-        let key = (material.to_owned(), medium.to_owned());
+        let key = (material.to_owned(), inside.clone(), outside.is_some());
         if let Some(name) = self.containers.get(&key) {
             return Some(name.clone());
         }
-        let desc = MaterialDesc::Dielectric(Box::new(DielectricDesc { medium: Some(medium.into()), ..desc }));
-        let name = self.draft.add_material(&format!("{medium}_surface"), "", desc);
+        // What lies in another medium displaces it.
+        let priority = Some(i32::from(outside.is_some()));
+        let desc = MaterialDesc::Dielectric(Box::new(DielectricDesc { priority, medium: inside.clone(), ..desc }));
+        let name = format!("{}_surface", inside.as_deref().unwrap_or(material));
+        let name = self.draft.add_material(&name, "", desc);
         self.containers.insert(key, name.clone());
         Some(name)
     }
 
-    /// Notes the medium outside of a shape, or around the camera or a light.
-    pub(super) fn medium_outside(&mut self, element: &mut Element<'a>, names: &[&str]) -> Result<()> {
-        for name in names {
-            let medium = self.medium(element, name)?;
+    /// The media inside and outside of a shape.
+    pub(super) fn medium_interface(&mut self, element: &mut Element<'a>) -> Result<MediumInterface> {
+        let inside = self.medium(element, "interior")?;
+        let outside = self.medium(element, "exterior")?;
+        self.media_outside.extend(outside.clone());
+        element.ignored_other_plugins("medium", "media have the names \"interior\" and \"exterior\"")?;
+        Ok(MediumInterface { inside, outside })
+    }
+
+    /// Notes the medium around the camera or a light, whatever its name.
+    pub(super) fn medium_outside(&mut self, element: &mut Element<'a>) -> Result<()> {
+        for property in &element.plugin.properties {
+            let medium = self.medium(element, &property.name)?;
             self.media_outside.extend(medium);
         }
-        element.ignored_other_plugins("medium", "media have the names \"interior\" and \"exterior\"")
+        Ok(())
     }
 
     /// What is outside of some shape and inside of none is around everything.

@@ -77,8 +77,9 @@ struct Reader<'a> {
     black: Option<String>,
     /// What media have become; none where they are unsupported.
     media: BTreeMap<PluginId, Option<String>>,
-    /// Materials of surfaces of media, by those of the surface and the names of the media.
-    containers: BTreeMap<(String, String), String>,
+    /// Materials of surfaces of media, by those of the surface, the names of the media inside, and whether another is
+    /// outside.
+    containers: BTreeMap<(String, Option<String>, bool), String>,
     /// Media that are inside of some shape,
     media_inside: BTreeSet<String>,
     /// and outside of some, or around a camera or a light.

@@ -9,7 +9,7 @@ use super::camera::{self, CameraDirective};
 use super::colors::{ColorSpace, Colors};
 use super::lights::Lights;
 use super::materials::Materials;
-use super::media::{Media, MediumInterface};
+use super::media::{MediumInterface, MediumTable};
 use super::options::{self, Typed};
 use super::params::{Params, Values};
 use super::shapes::{Directive, Shapes};
@@ -63,7 +63,7 @@ pub(crate) struct Reader {
     /// Names in the scene by those in the file; `None` if nothing of the object can be seen.
     objects: BTreeMap<String, Option<String>>,
     object: Option<Object>,
-    media: Media,
+    media: MediumTable,
 }
 
 impl Reader {
@@ -88,7 +88,7 @@ impl Reader {
             materials: BTreeMap::new(),
             objects: BTreeMap::new(),
             object: None,
-            media: Media::default(),
+            media: MediumTable::default(),
         }
     }
 

@@ -34,18 +34,19 @@ impl MediumInterface {
 
 /// The media of a scene.
 #[derive(Debug, Default)]
-pub struct Media {
+pub struct MediumTable {
     /// Names in the scene by pbrt's; `None` of media that are left out.
     names: BTreeMap<String, Option<String>>,
-    /// Materials of surfaces of media, by those of the surface (empty for none) and the names of the media.
-    containers: BTreeMap<(String, String), String>,
+    /// Materials of surfaces of media, by those of the surface (empty for none), the names of the media inside, and
+    /// whether another is outside.
+    containers: BTreeMap<(String, Option<String>, bool), String>,
     inside: BTreeSet<String>,
     outside: BTreeSet<String>,
     /// Whether the integrator shows none.
     pub are_hidden: bool,
 }
 
-impl Media {
+impl MediumTable {
     /// Reads a medium.
     pub fn define(&mut self, draft: &mut Draft, name: &str, params: &Params, colors: &Colors) -> Result<()> {
         let kind = params.string("type")?.unwrap_or("homogeneous");
@@ -109,21 +110,29 @@ impl Media {
         interface: &MediumInterface,
         material: Option<&str>,
     ) -> Option<String> {
-        self.surround(draft, params, &interface.outside);
-        let medium =
-            if interface.inside == interface.outside { None } else { self.find(draft, params, &interface.inside) }?;
+        if interface.inside == interface.outside {
+            self.surround(draft, params, &interface.outside);
+            return None;
+        }
+        let inside = self.find(draft, params, &interface.inside);
+        let outside = self.find(draft, params, &interface.outside);
+        self.outside.extend(outside.clone());
         let desc = match material.map(|name| draft.desc.materials.get(name)) {
+            _ if inside.is_none() && outside.is_none() => return None,
             None => DielectricDesc::invisible(),
             Some(Some(MaterialDesc::Dielectric(glass))) => (**glass).clone(),
             Some(_) => return None,
         };
-        self.inside.insert(medium.clone());
-        let key = (material.unwrap_or_default().to_owned(), medium.clone());
+        self.inside.extend(inside.clone());
+        let key = (material.unwrap_or_default().to_owned(), inside.clone(), outside.is_some());
         if let Some(name) = self.containers.get(&key) {
             return Some(name.clone());
         }
-        let desc = MaterialDesc::Dielectric(Box::new(DielectricDesc { medium: Some(medium.clone()), ..desc }));
-        let name = draft.add_material(&format!("{medium}_surface"), &params.place, desc);
+        let name = format!("{}_surface", inside.as_deref().or(material).unwrap_or("interface"));
+        // What lies in another medium displaces it.
+        let priority = Some(i32::from(outside.is_some()));
+        let desc = MaterialDesc::Dielectric(Box::new(DielectricDesc { priority, medium: inside, ..desc }));
+        let name = draft.add_material(&name, &params.place, desc);
         self.containers.insert(key, name.clone());
         Some(name)
     }

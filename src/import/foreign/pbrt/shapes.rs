@@ -7,9 +7,9 @@ use super::area_light::{AreaLight, Extent};
 use super::bilinear::Patches;
 use super::colors::Colors;
 use super::loop_subdivision;
-use super::media::Media;
+use super::media::MediumTable;
 use super::params::Params;
-use super::state::{Graphics, ShapeMaterial, World};
+use super::state::{Ctm, Graphics, ShapeMaterial, World};
 use super::textures::Textures;
 use super::triangles;
 use crate::assets::{MeshData, read_ply_attributes};
@@ -57,8 +57,18 @@ enum Form {
     File(String),
 }
 
+/// The transforms of a shape; what gives off light does not move.
+fn still_if_lit(draft: &mut Draft, params: &Params, mut ctm: Ctm, is_light: bool) -> Ctm {
+    if is_light && ctm.is_moving() {
+        let how = "what gives off light stands still where it is at first";
+        draft.approximated(&params.place, &params.element, "transform", how);
+        ctm.0[1] = ctm.0[0];
+    }
+    ctm
+}
+
 /// The material of a shape that has a medium inside.
-fn container(draft: &mut Draft, media: &mut Media, params: &Params, graphics: &Graphics) -> Option<String> {
+fn container(draft: &mut Draft, media: &mut MediumTable, params: &Params, graphics: &Graphics) -> Option<String> {
     let own = match graphics.material.as_deref() {
         Some(ShapeMaterial::Interface) => None,
         Some(ShapeMaterial::Material(material)) => Some(material.name.as_str()),
@@ -85,7 +95,7 @@ impl Shapes<'_> {
     pub fn read(
         &self,
         draft: &mut Draft,
-        media: &mut Media,
+        media: &mut MediumTable,
         Directive { kind, params }: Directive,
         graphics: &Graphics,
     ) -> Result<Option<ShapeDesc>> {
@@ -126,16 +136,7 @@ impl Shapes<'_> {
             }
             Form::File(file) => (ShapeDesc::Mesh(MeshDesc::from_file(file)), DAffine3::IDENTITY, None),
         };
-        let mut ctm = graphics.ctm;
-        if light.is_some() && ctm.is_moving() {
-            draft.approximated(
-                &params.place,
-                &params.element,
-                "transform",
-                "what gives off light stands still where it is at first",
-            );
-            ctm.0[1] = ctm.0[0];
-        }
+        let ctm = still_if_lit(draft, params, graphics.ctm, light.is_some());
         let common = shape.common_mut();
         (*common.transform, *common.motion) = self.world.place(&ctm, inner);
         *common.material = material;
