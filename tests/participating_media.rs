@@ -171,7 +171,7 @@ fn single_scattering_in_fog_is_the_quadrature() {
                 let t = x / (1.0 - x);
                 let (along, r) = (t - ahead, ((t - ahead).powi(2) + side * side).sqrt());
                 // Light comes from the light to the point, and goes on towards the camera.
-                let cos = along * -1.0 / r;
+                let cos = -along / r;
                 let light = 2.0 / (r * r) * (-extinction * (r + t)).exp();
                 SCATTERING[c] * value(cos) * light / (1.0 - x).powi(2)
             })

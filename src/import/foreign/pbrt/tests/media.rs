@@ -14,8 +14,8 @@ fn an_interface_between_media_is_invisible() {
     assert_eq!(medium.absorption.to_array(), [0.5, 1.0, 1.5]);
     assert_eq!(medium.scattering.to_array(), [2.0, 2.5, 3.0]);
     assert_eq!(medium.phase, PhaseDesc::HenyeyGreenstein { g: 0.25 });
-    let name = shape(&found).common().material.unwrap().clone();
-    let MaterialDesc::Dielectric(glass) = &found.desc.materials[&name] else { panic!("{found:?}") };
+    let name = shape(&found).common().material.unwrap();
+    let MaterialDesc::Dielectric(glass) = &found.desc.materials[name] else { panic!("{found:?}") };
     assert_eq!(glass.medium.as_deref(), Some("smoke"));
     assert_eq!(found.desc.medium, None);
 }
