@@ -7,6 +7,7 @@
 
 use std::cmp::Ordering;
 
+use crate::bsdf::Phase;
 use crate::color::Rgb;
 use crate::id::MediumId;
 
@@ -23,17 +24,82 @@ pub struct Medium {
     pub priority: i32,
     /// Index of refraction for red, green and blue; that of empty space is 1.
     pub ior: [f32; 3],
-    /// Absorption coefficient for red, green and blue, per unit of length, finite and not negative.
+    /// Coefficients for red, green and blue, per unit of length, finite and not negative: of absorption,
     pub absorption: Rgb,
+    /// and of scattering.
+    pub scattering: Rgb,
+    /// Radiance that it gives off per unit of length.
+    pub emission: Rgb,
+    /// How it scatters.
+    pub phase: Phase,
 }
 
 impl Medium {
     /// The order in which media count where they overlap: by priority; at equal priorities the one of the higher index
-    /// of refraction, then the one that absorbs more. Media that are equal in all that are one medium.
+    /// of refraction, then the one that absorbs more, then the one that scatters more. Media that are equal in all that
+    /// are one medium.
     pub fn precedence(&self, other: &Self) -> Ordering {
-        let key = |m: &Self| [m.ior[0], m.ior[1], m.ior[2], m.absorption.r, m.absorption.g, m.absorption.b];
+        let phase = |phase: Phase| match phase {
+            Phase::HenyeyGreenstein { g } => [0.0, g, 0.0],
+            Phase::Rayleigh => [1.0, 0.0, 0.0],
+        };
+        let key = |m: &Self| {
+            let [absorption, scattering, emission] = [m.absorption, m.scattering, m.emission].map(Rgb::to_array);
+            [m.ior, absorption, scattering, emission, phase(m.phase)].concat()
+        };
         let ties = key(self).into_iter().zip(key(other)).map(|(a, b)| b.total_cmp(&a));
         other.priority.cmp(&self.priority).then(ties.fold(Ordering::Equal, Ordering::then))
+    }
+
+    /// Clear and of no refraction.
+    pub fn clear(priority: i32) -> Self {
+        Self {
+            priority,
+            ior: [1.0; 3],
+            absorption: Rgb::BLACK,
+            scattering: Rgb::BLACK,
+            emission: Rgb::BLACK,
+            phase: Phase::ISOTROPIC,
+        }
+    }
+
+    /// The coefficient of all that light loses.
+    #[inline]
+    pub fn extinction(&self) -> Rgb {
+        self.absorption + self.scattering
+    }
+
+    /// What it scatters of the light that it takes.
+    pub fn albedo(&self) -> Rgb {
+        let of = |scattering: f32, absorption: f32| {
+            if scattering > 0.0 { scattering / (scattering + absorption) } else { 0.0 }
+        };
+        let (scattering, absorption) = (self.scattering, self.absorption);
+        Rgb::new(of(scattering.r, absorption.r), of(scattering.g, absorption.g), of(scattering.b, absorption.b))
+    }
+
+    /// Whether it does more than to absorb.
+    #[inline]
+    pub fn is_participating(&self) -> bool {
+        !self.scattering.is_black() || !self.emission.is_black()
+    }
+
+    /// Radiance that the medium gives off along `distance`, as it arrives at one end.
+    pub fn emitted(&self, distance: f32) -> Rgb {
+        let of = |emission: f32, extinction: f32| {
+            let depth = extinction * distance;
+            if emission <= 0.0 {
+                0.0
+            } else if depth > 0.0 {
+                emission * (-(-depth).exp_m1() / extinction)
+            } else if distance < f32::INFINITY {
+                emission * distance
+            } else {
+                0.0
+            }
+        };
+        let (emission, extinction) = (self.emission, self.extinction());
+        Rgb::new(of(emission.r, extinction.r), of(emission.g, extinction.g), of(emission.b, extinction.b))
     }
 }
 
@@ -48,8 +114,8 @@ pub fn dispersed(ior: f32, abbe: f32) -> [f32; 3] {
 
 /// What is left of light, of its red, green and blue, after a distance (infinite for a ray that meets nothing).
 #[inline]
-pub fn transmittance(absorption: Rgb, distance: f32) -> Rgb {
-    absorption.map(|a| if a > 0.0 { (-a * distance).exp() } else { 1.0 })
+pub fn transmittance(extinction: Rgb, distance: f32) -> Rgb {
+    extinction.map(|a| if a > 0.0 { (-a * distance).exp() } else { 1.0 })
 }
 
 /// Different media that may overlap at one point.
@@ -77,7 +143,7 @@ impl Default for Entry {
 }
 
 impl MediumStack {
-    /// The medium that is there; `None` in empty space.
+    /// The medium of the surfaces around the point that is there; `None` outside of all.
     #[inline]
     pub fn medium(&self) -> Option<MediumId> {
         (self.entries[0].count > 0).then_some(self.entries[0].medium)
@@ -150,21 +216,53 @@ pub enum RelativeIor {
 pub struct Media {
     /// By [`MediumId`], in the order of precedence.
     list: Vec<Medium>,
+    /// What is where no surface of a medium is around a point.
+    around: Option<MediumId>,
 }
 
 impl Media {
-    /// Those that are different, in their order.
-    pub fn new(media: impl IntoIterator<Item = Medium>) -> Self {
-        let mut list: Vec<Medium> = media.into_iter().collect();
+    /// Those that are different, in their order, and what is `around` them.
+    pub fn new(media: impl IntoIterator<Item = Medium>, around: Option<Medium>) -> Self {
+        let mut list: Vec<Medium> = media.into_iter().chain(around).collect();
         list.sort_by(Medium::precedence);
         list.dedup();
-        Self { list }
+        let mut media = Self { list, around: None };
+        media.around = around.and_then(|around| media.id(&around));
+        media
+    }
+
+    /// Whether something is where no surface of a medium is around a point.
+    pub fn has_surroundings(&self) -> bool {
+        self.around.is_some()
+    }
+
+    /// What is around everything, if anything is.
+    pub fn surroundings(&self) -> Option<&Medium> {
+        self.around.map(|id| &self.list[id.index()])
+    }
+
+    /// All, by [`MediumId`].
+    pub fn iter(&self) -> impl Iterator<Item = &Medium> {
+        self.list.iter()
+    }
+
+    /// The medium with this id.
+    #[inline]
+    pub fn get(&self, id: MediumId) -> &Medium {
+        &self.list[id.index()]
+    }
+
+    /// What is at a point within `current`; `None` in empty space.
+    #[inline]
+    pub fn at(&self, current: &MediumStack) -> Option<MediumId> {
+        current.medium().or(self.around)
     }
 
     /// These where a unit of length is `factor` of the unit so far.
     pub fn rescale(&mut self, factor: f64) {
         for medium in &mut self.list {
-            medium.absorption = medium.absorption.map(|a| (f64::from(a) * factor) as f32);
+            let coefficients = [&mut medium.absorption, &mut medium.scattering, &mut medium.emission];
+            coefficients.into_iter().for_each(|c| *c = c.map(|c| (f64::from(c) * factor) as f32));
         }
     }
 
@@ -180,12 +278,12 @@ impl Media {
 
     /// What is left of light after a distance within `here`.
     pub fn transmittance(&self, current: &MediumStack, distance: f32) -> Rgb {
-        current.medium().map_or(Rgb::WHITE, |id| transmittance(self.list[id.index()].absorption, distance))
+        self.at(current).map_or(Rgb::WHITE, |id| transmittance(self.get(id).extinction(), distance))
     }
 
     /// The relative index of refraction between the two sides of a surface, for one channel if it is chosen.
     pub fn relative_ior(&self, sides: &BoundaryMedia, channel: Option<usize>) -> RelativeIor {
-        let ior = |current: &MediumStack| current.medium().map_or([1.0; 3], |id| self.list[id.index()].ior);
+        let ior = |current: &MediumStack| self.at(current).map_or([1.0; 3], |id| self.get(id).ior);
         let (inside, outside) = (ior(&sides.inside), ior(&sides.outside));
         let relative = [0, 1, 2].map(|i| inside[i] / outside[i]);
         match channel {
@@ -216,13 +314,14 @@ mod tests {
     use super::*;
 
     fn medium(priority: i32, ior: f32) -> Medium {
-        Medium { priority, ior: [ior; 3], absorption: Rgb::BLACK }
+        Medium { ior: [ior; 3], ..Medium::clear(priority) }
     }
 
     #[test]
     fn media_come_in_the_order_of_priority_and_then_of_density() {
         let dark = Medium { absorption: Rgb::new(0.0, 1.0, 0.0), ..medium(1, 1.5) };
-        let media = Media::new([medium(1, 1.3), medium(-5, 2.0), medium(1, 1.5), dark, medium(2, 1.1), medium(1, 1.3)]);
+        let media =
+            Media::new([medium(1, 1.3), medium(-5, 2.0), medium(1, 1.5), dark, medium(2, 1.1), medium(1, 1.3)], None);
         let expected = [medium(2, 1.1), dark, medium(1, 1.5), medium(1, 1.3), medium(-5, 2.0)];
         assert_eq!(media.list, expected);
         for (i, m) in expected.iter().enumerate() {

@@ -67,8 +67,10 @@ pub struct SceneFeatures {
     pub parameters: bool,
     /// Some material has only delta lobes.
     pub delta_materials: bool,
-    /// Some surface has a medium within it: paths track their media.
+    /// Some surface has a medium within it, or one is around everything: paths track their media.
     pub media: bool,
+    /// Some medium scatters or gives off light.
+    pub participating_media: bool,
     /// Some material is anisotropic: shading frames follow the surface's u direction.
     pub anisotropic: bool,
     /// The camera has a lens.

@@ -13,6 +13,7 @@ use steradian::render::{
     self, Checkpoints, Header, Overrides, Progress, RenderSession, RenderState, Shard, Silent, StateFile,
 };
 
+use crate::participating_media::foggy;
 use crate::util::render::{Prepared, prepare};
 
 /// Glass, metal, lights of two groups and none, motion, a lens and a filter with negative lobes.
@@ -141,8 +142,7 @@ fn a_resumed_render_has_the_bits_of_one_run() {
     let folder = tempfile::tempdir().unwrap();
     let file = StateFile::take(&folder.path().join("a.state")).unwrap();
     let mut rng = Rng::new(3);
-    for filter in ["box", "mitchell"] {
-        let scene = scene(filter);
+    for (name, scene) in [("box", scene("box")), ("mitchell", scene("mitchell")), ("fog", foggy(6))] {
         let whole = Kit::new(&scene, &spp(24));
         let reference = whole.render(Shard::WHOLE);
         assert!(reference.complete);
@@ -157,7 +157,7 @@ fn a_resumed_render_has_the_bits_of_one_run() {
                 state = part.kept(&part.go_on(state, &Silent, &AtomicBool::new(false)), &file);
                 assert_eq!(state.done, target);
             }
-            assert!(bits(&state.film) == bits(&reference.film), "{filter}: {first}, {second}");
+            assert!(bits(&state.film) == bits(&reference.film), "{name}: {first}, {second}");
             assert_eq!((state.rays, state.film.dropped()), (reference.rays, reference.film.dropped()));
             assert!(state.film.resolve() == image);
         }

@@ -28,10 +28,11 @@ const SCENE: &str = r#"{
 
 const WALL: &str = "v -1 -1 -2\nv 1 -1 -2\nv 1 2 -2\nv -1 2 -2\nf 1 2 3 4\n";
 
-const ALL_LAYERS: &str = "Z,N,Ng,P,uv,motion,albedo,diffuse_direct,diffuse_indirect,specular_direct,specular_indirect,\
-                          transmission_direct,transmission_indirect,emission,background,light_groups,variance,samples,\
-                          feature_albedo,feature_normal,object_id,material_id,instance_id,crypto_object,\
-                          crypto_material,crypto_asset";
+const ALL_LAYERS: &str = "Z,N,Ng,P,uv,motion,albedo,diffuse_direct,diffuse_indirect,specular_direct,\
+                          specular_indirect,transmission_direct,transmission_indirect,volume_direct,\
+                          volume_indirect,emission,background,light_groups,variance,samples,feature_albedo,\
+                          feature_normal,object_id,material_id,instance_id,crypto_object,crypto_material,\
+                          crypto_asset";
 
 const PROFILES: [&str; 4] = ["default", "nuke", "blender", "multipart"];
 

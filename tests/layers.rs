@@ -17,13 +17,15 @@ use crate::util::render::{
 };
 
 /// The parts of the light by how it came.
-const PARTS: [LayerKind; 8] = [
+const PARTS: [LayerKind; 10] = [
     LayerKind::DiffuseDirect,
     LayerKind::DiffuseIndirect,
     LayerKind::SpecularDirect,
     LayerKind::SpecularIndirect,
     LayerKind::TransmissionDirect,
     LayerKind::TransmissionIndirect,
+    LayerKind::VolumeDirect,
+    LayerKind::VolumeIndirect,
     LayerKind::Emission,
     LayerKind::Background,
 ];
@@ -75,7 +77,7 @@ fn assert_sum(image: &Image, layers: &[&Layer], what: &str) {
 }
 
 #[track_caller]
-fn assert_sums(image: &Image, what: &str) {
+pub fn assert_sums(image: &Image, what: &str) {
     let parts: Vec<&Layer> = PARTS.iter().map(|&kind| image.layer(kind).unwrap()).collect();
     assert_sum(image, &parts, what);
     assert_sum(image, &groups(image), what);

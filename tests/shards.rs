@@ -10,6 +10,7 @@ use steradian::render::{self, Overrides, Shard, StateFile};
 
 use crate::checkpoints::{Kit, scene};
 use crate::interrupted::channels;
+use crate::participating_media::foggy;
 
 /// Writes shards, and returns their files.
 fn written(kit: &Kit, folder: &Path, shards: impl IntoIterator<Item = Shard>) -> Vec<PathBuf> {
@@ -47,8 +48,8 @@ fn assert_same_bits(a: &Image, b: &Image) {
 #[test]
 fn shards_make_the_picture_of_one_run() {
     let mut rng = Rng::new(1);
-    for filter in ["blackman_harris", "mitchell"] {
-        let kit = Kit::new(&scene(filter), &overrides(23));
+    for scene in [scene("blackman_harris"), scene("mitchell"), foggy(6)] {
+        let kit = Kit::new(&scene, &overrides(23));
         let whole = kit.render(Shard::WHOLE);
         let image = whole.film.resolve();
         for count in [2, 3 + rng.below(6) as u32, 23] {

@@ -97,6 +97,8 @@ mod nested_media;
 mod opacity;
 /// Our accelerators against the oracle: the same answers bit for bit, on anything, with bounded work.
 mod own_accelerators;
+/// Media that scatter and give off light.
+mod participating_media;
 /// Planes without end.
 mod planes;
 /// Normal maps, bump maps and smooth normals, without leaks and black rims.

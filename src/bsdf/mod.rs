@@ -17,6 +17,7 @@ mod glossy;
 mod lambert;
 mod microfacet;
 mod mirror;
+mod phase;
 mod phong;
 mod plastic;
 mod principled;
@@ -41,6 +42,7 @@ pub use glossy::Glossy;
 pub use lambert::{DiffuseDirection, Lambert};
 pub use microfacet::{Ggx, Microfacets, SMOOTH_ALPHA, SeparableGgx};
 pub use mirror::Mirror;
+pub use phase::Phase;
 pub use phong::Phong;
 pub use plastic::Plastic;
 pub use principled::{Principled, PrincipledModel, PrincipledParameters};
@@ -126,6 +128,8 @@ pub enum Bsdf {
     Beckmann(SingleScatteringBsdf<Beckmann>),
     /// One of the above with GGX microfacets masked on each side independently.
     SeparableGgx(SingleScatteringBsdf<SeparableGgx>),
+    /// Scattering within a medium.
+    Phase(Phase),
 }
 
 // Constructed at every hit: no kind may make the others slower to pass around.
@@ -148,6 +152,7 @@ macro_rules! each {
             Bsdf::Coated($bsdf) => $body,
             Bsdf::Beckmann($bsdf) => $body,
             Bsdf::SeparableGgx($bsdf) => $body,
+            Bsdf::Phase($bsdf) => $body,
         }
     };
 }

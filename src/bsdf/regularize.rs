@@ -25,7 +25,8 @@ impl Bsdf {
             | Self::DiffuseTransmission(_)
             | Self::Mirror(_)
             | Self::ThinDielectric(_)
-            | Self::Phong(_) => {
+            | Self::Phong(_)
+            | Self::Phase(_) => {
                 return None;
             }
         })

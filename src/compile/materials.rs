@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use super::CompileContext;
+use super::media::NamedMedia;
 use super::textures::{TextureTable, TextureUse};
 use crate::bsdf::{Beckmann, Coat, Conductor, Ggx, Lambert, SeparableGgx, diffuse_mean, mitsuba_diffuse_mean};
 use crate::color::Rgb;
@@ -66,11 +67,12 @@ impl MaterialTable {
             names: HashMap::new(),
             medium_of: HashMap::new(),
         };
-        let compiler = Compiler { files, textures: &textures };
+        let media = NamedMedia::new(files, desc)?;
+        let compiler = Compiler { files, textures: &textures, media: &media };
         for name in desc.materials.keys() {
             table.add(&compiler, desc, name, &mut Vec::new())?;
         }
-        table.media = Media::new(table.medium_of.values().copied());
+        table.media = Media::new(table.medium_of.values().copied(), media.around(files, desc)?);
         table.textures = textures;
         Ok(table)
     }
@@ -150,6 +152,7 @@ impl MaterialTable {
 pub(super) struct Compiler<'a> {
     pub(super) files: &'a CompileContext,
     pub(super) textures: &'a TextureTable,
+    pub(super) media: &'a NamedMedia<'a>,
 }
 
 impl Compiler<'_> {

@@ -1,9 +1,12 @@
 //! Media: which material has which.
 
+use std::collections::BTreeMap;
+
 use super::CompileContext;
 use super::materials::{Compiler, MaterialTable};
+use crate::bsdf::Phase;
 use crate::color::Rgb;
-use crate::desc::{AbsorptionDesc, MaterialDesc};
+use crate::desc::{AbsorptionDesc, CoefficientDesc, MaterialDesc, MediumDesc, PhaseDesc, SceneDesc};
 use crate::error::Result;
 use crate::id::{MaterialId, MediumId};
 use crate::material::Material;
@@ -31,9 +34,17 @@ impl Compiler<'_> {
                 iors
             }
         };
+        let priority = glass.priority.unwrap_or(0);
+        if let Some(name) = &glass.medium {
+            let path = format!("{path}.medium");
+            if glass.absorption.is_some() {
+                return Err(self.files.error(&path, "cannot be given together with `absorption`"));
+            }
+            return Ok(Some(Medium { priority, ior, ..self.media.get(self.files, &path, name)? }));
+        }
         let absorption =
             glass.absorption.map_or(Ok(Rgb::BLACK), |a| self.absorption(&format!("{path}.absorption"), &a))?;
-        Ok(Some(Medium { priority: glass.priority.unwrap_or(0), ior, absorption }))
+        Ok(Some(Medium { ior, absorption, ..Medium::clear(priority) }))
     }
 
     fn absorption(&self, path: &str, desc: &AbsorptionDesc) -> Result<Rgb> {
@@ -50,6 +61,70 @@ impl Compiler<'_> {
         }
         Ok(coefficients.into())
     }
+}
+
+/// Media of the scene by name, of priority 0 and index 1.
+pub(super) struct NamedMedia<'a>(BTreeMap<&'a str, Medium>);
+
+impl<'a> NamedMedia<'a> {
+    pub fn new(files: &CompileContext, desc: &'a SceneDesc) -> Result<Self> {
+        let media = desc
+            .media
+            .iter()
+            .map(|(name, medium)| Ok((name.as_str(), participating(files, &format!("media.{name}"), medium)?)));
+        Ok(Self(media.collect::<Result<_>>()?))
+    }
+
+    /// The medium that `path` names.
+    pub fn get(&self, files: &CompileContext, path: &str, name: &str) -> Result<Medium> {
+        self.0.get(name).copied().ok_or_else(|| files.unknown(path, "medium", name, self.0.keys().copied()))
+    }
+
+    /// What is around everything.
+    pub fn around(&self, files: &CompileContext, desc: &SceneDesc) -> Result<Option<Medium>> {
+        let Some(name) = &desc.medium else { return Ok(None) };
+        let medium = self.get(files, "medium", name)?;
+        let [emission, extinction] = [medium.emission, medium.extinction()].map(Rgb::to_array);
+        if emission.into_iter().zip(extinction).any(|(e, t)| e > 0.0 && t == 0.0) {
+            let message = "gives off light but neither absorbs nor scatters it: all around, that is infinitely much";
+            return Err(files.error("medium", message));
+        }
+        Ok(Some(medium))
+    }
+}
+
+/// The largest coefficient, per world unit.
+const MAX_COEFFICIENT: f32 = 1e15;
+
+/// The largest mean cosine of a phase function.
+const MAX_G: f32 = 0.99;
+
+fn participating(files: &CompileContext, path: &str, desc: &MediumDesc) -> Result<Medium> {
+    let MediumDesc { absorption, scattering, emission, phase } = desc;
+    let coefficient = |key: &str, desc: &CoefficientDesc| {
+        let values = desc.to_array();
+        if values.iter().all(|value| (0.0..=MAX_COEFFICIENT).contains(value)) {
+            // Adding 0 turns -0 into 0.
+            return Ok(Rgb::from(values.map(|value| value + 0.0)));
+        }
+        let message = format!("{values:?} must be from 0 to {MAX_COEFFICIENT:e}");
+        Err(files.error(&format!("{path}.{key}"), message))
+    };
+    let phase = match *phase {
+        PhaseDesc::Isotropic => Phase::ISOTROPIC,
+        PhaseDesc::HenyeyGreenstein { g } => {
+            files.within(&format!("{path}.phase.g"), f64::from(g), -f64::from(MAX_G), f64::from(MAX_G))?;
+            Phase::HenyeyGreenstein { g: g + 0.0 }
+        }
+        PhaseDesc::Rayleigh => Phase::Rayleigh,
+    };
+    Ok(Medium {
+        absorption: coefficient("absorption", absorption)?,
+        scattering: coefficient("scattering", scattering)?,
+        emission: coefficient("emission", emission)?,
+        phase,
+        ..Medium::clear(0)
+    })
 }
 
 impl MaterialTable {
@@ -70,7 +145,7 @@ impl MaterialTable {
         match parts.map(|id| self.transmits(id)) {
             [true, true] if medium(parts[0]) != medium(parts[1]) => {
                 let message = "both materials let light through, but not into the same medium: they differ in `ior`, \
-                               `priority`, `absorption` or `abbe`";
+                               `priority`, `absorption`, `medium` or `abbe`";
                 Err(files.error(path, message))
             }
             [true, _] => Ok(medium(parts[0])),

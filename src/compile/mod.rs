@@ -30,17 +30,19 @@ mod transforms;
 pub use settings::{CheckedScene, check_film_and_integrator};
 pub use summary::Summary;
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 use crate::assets::{AssetError, SceneSource};
-use crate::desc::{IntegratorDesc, SceneDesc};
+use crate::desc::{CausticsDesc, IntegratorDesc, SceneDesc};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Shape};
 use crate::id::TextureId;
 use crate::light::LightSet;
 use crate::material::Material;
 use crate::math::{Bounds, RenderSpace};
+use crate::medium::Medium;
 use crate::scene::{Scene, SceneFeatures, Surface};
 use crate::suggestion::did_you_mean;
 use crate::texture::Texture;
@@ -189,6 +191,13 @@ struct Builder {
 }
 
 impl Builder {
+    /// The media of all surfaces, and what is around them.
+    fn media_in_use(&self) -> Vec<Medium> {
+        let media = &self.materials.media;
+        let of_surfaces = self.surfaces.iter().filter_map(|surface| surface.medium).collect::<BTreeSet<_>>();
+        of_surfaces.into_iter().map(|id| media.get(id)).chain(media.surroundings()).copied().collect()
+    }
+
     fn finish(mut self, desc: &SceneDesc, camera: crate::camera::Camera) -> Result<Scene> {
         let files = &self.files;
         if !self.space.is_world() {
@@ -198,17 +207,15 @@ impl Builder {
             }
         }
         self.geometry.cutouts = opacity::cutouts(&self.geometry.shapes, &self.opacities, &self.materials.textures);
+        let in_use = self.media_in_use();
         let light_groups = self.lights.groups();
         let lights = LightSet::new(self.lights.lights, &self.geometry);
         let sky = !lights.at_infinity().is_empty();
-        if self.geometry.world.is_empty() && self.geometry.instances.is_empty() && !sky {
+        let fog = self.materials.media.surroundings().is_some_and(Medium::is_participating);
+        if self.geometry.world.is_empty() && self.geometry.instances.is_empty() && !sky && !fog {
             files.refuse_own("shapes", "there is nothing to see: no shapes, no instances and no environment")?;
         }
-        if !lights.shines() && needs_light(&desc.integrator) {
-            let message = "the scene has no light: give a shape an `emission`, or add an environment, point, spot or \
-                           directional light";
-            files.refuse_own("lights", message)?;
-        }
+        check_light(files, &desc.integrator, lights.shines(), &in_use)?;
         let part_normal_perturbations = self.materials.part_normal_perturbations();
         let materials = self.materials.materials;
         let normal_perturbations = !part_normal_perturbations.is_empty()
@@ -229,7 +236,8 @@ impl Builder {
             shading_normals: normal_perturbations || self.geometry.shapes.iter().any(smooth),
             parameters: anisotropic || !self.materials.textures.textures.is_empty(),
             delta_materials: materials.iter().any(|material| material.flags().is_delta()),
-            media: self.surfaces.iter().any(|surface| surface.medium.is_some()),
+            media: !in_use.is_empty(),
+            participating_media: in_use.iter().any(Medium::is_participating),
             anisotropic,
             lens: camera.lens().is_some(),
             motion: self.geometry.is_moving() || camera.is_moving(),
@@ -249,6 +257,25 @@ impl Builder {
             identities: self.identities.finish(),
         })
     }
+}
+
+/// Refuses a scene without light, and photons where they would have to be traced through media that scatter.
+fn check_light(files: &CompileContext, integrator: &IntegratorDesc, lights: bool, media: &[Medium]) -> Result<()> {
+    let gives_off = media.iter().any(|medium| !medium.emission.is_black());
+    if !lights && !gives_off && needs_light(integrator) {
+        let message = "the scene has no light: give a shape an `emission`, or add an environment, point, spot or \
+                       directional light";
+        files.refuse_own("lights", message)?;
+    }
+    if has_photons(integrator) && media.iter().any(Medium::is_participating) {
+        return Err(files.error("integrator.caustics", "photons are not traced through media that scatter"));
+    }
+    Ok(())
+}
+
+/// Whether an integrator traces photons.
+fn has_photons(integrator: &IntegratorDesc) -> bool {
+    matches!(integrator, IntegratorDesc::Path { caustics: CausticsDesc::Photons, .. })
 }
 
 /// Whether an integrator shows nothing without a light.

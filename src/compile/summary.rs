@@ -131,6 +131,7 @@ fn features(scene: &Scene) -> Vec<&'static str> {
         (!scene.geometry.cutouts.is_empty(), "holes"),
         (f.delta_materials, "mirror or glass"),
         (f.media, "media"),
+        (f.participating_media, "participating media"),
         (f.anisotropic, "anisotropic materials"),
         (f.lens, "lens"),
         (f.motion, "motion"),

@@ -319,17 +319,18 @@ pub struct PlasticDesc {
 
 /// Glass, water and the like. Smooth unless `roughness` or `alpha` is given.
 ///
-/// With none of `priority`, `absorption` and `abbe` it is a boundary alone, whose `ior` is relative to whatever lies
-/// outside.
+/// With none of `priority`, `absorption`, `medium` and `abbe` it is a boundary alone, whose `ior` is relative to
+/// whatever lies outside.
 ///
 /// With any of them it is a medium, which fills the closed surfaces that have the material (or a mix of it with opaque
 /// materials, such as a label). Surfaces of media may overlap, as that of a drink must overlap the inner side of its
 /// glass: each point belongs to the medium of the highest `priority` among those around it, at equal priorities to the
 /// one of the higher `ior`, then to the one that absorbs more. Light is reflected and refracted only where the medium
 /// changes, by the ratio of both indices; elsewhere it passes as if no surface were there, which then does not show in
-/// the layers either. Materials with the same `ior`, `priority`, `absorption` and `abbe` are one medium, rough or not.
-/// Up to eight different media overlap. A hollow is a surface with `reverse_normal`, or one of a medium of `ior` 1 and
-/// a higher priority. The camera may stand in a medium; `near` belongs to what is not seen, and absorbs nothing.
+/// the layers either. Materials with the same `ior`, `priority`, `absorption`, `medium` and `abbe` are one medium,
+/// rough or not. Up to eight different media overlap. A hollow is a surface with `reverse_normal`, or one of a medium
+/// of `ior` 1 and a higher priority. The camera may stand in a medium; `near` belongs to what is not seen, and absorbs
+/// nothing.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DielectricDesc {
@@ -362,6 +363,10 @@ pub struct DielectricDesc {
     /// What the medium absorbs. Default: nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub absorption: Option<AbsorptionDesc>,
+    /// The participating medium within, by its name in the scene's `media`, in place of `absorption`; with an `ior` of
+    /// 1 its surface is invisible. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub medium: Option<String>,
     /// Dispersion: the Abbe number, from 1 to 1000 (60 for window glass, 30 for flint glass, 55 for diamond), the lower
     /// the more colours part; `ior` is then that of yellow light (587.6 nm). `path` follows one of red, green and blue
     /// from the first such boundary on, which takes more samples; `whitted` shows no dispersion. Default: none.
@@ -370,9 +375,26 @@ pub struct DielectricDesc {
 }
 
 impl DielectricDesc {
+    /// A smooth boundary that light does not notice, unless there is a medium.
+    pub fn invisible() -> Self {
+        Self {
+            ior: RangedDesc::Constant(1.0),
+            roughness: None,
+            alpha: None,
+            distribution: DistributionDesc::default(),
+            multiscatter: true,
+            reflection_tint: white(),
+            transmission_tint: white(),
+            priority: None,
+            absorption: None,
+            medium: None,
+            abbe: None,
+        }
+    }
+
     /// Whether it is a medium, not a boundary alone.
     pub fn is_medium(&self) -> bool {
-        self.priority.is_some() || self.absorption.is_some() || self.abbe.is_some()
+        self.priority.is_some() || self.absorption.is_some() || self.medium.is_some() || self.abbe.is_some()
     }
 }
 

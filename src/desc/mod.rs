@@ -8,6 +8,7 @@ mod camera;
 mod files;
 mod light;
 mod material;
+mod medium;
 mod output;
 mod principled;
 mod settings;
@@ -26,6 +27,7 @@ pub use material::{
     AbsorptionDesc, BumpMapDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc,
     PhongLobeDesc, PlasticDesc, RangedDesc, RoughnessDesc, ScalarDesc,
 };
+pub use medium::{CoefficientDesc, MediumDesc, PhaseDesc};
 pub use output::{CompressionDesc, CryptoManifestDesc, ExrProfileDesc, LayerKind, OutputDesc, PixelTypeDesc, ViewDesc};
 pub(crate) use principled::principled_parameters;
 pub use principled::{PrincipledDesc, PrincipledModelDesc};
@@ -77,6 +79,13 @@ pub struct SceneDesc {
     /// Materials by name.
     #[serde(default, deserialize_with = "unique_names", skip_serializing_if = "BTreeMap::is_empty")]
     pub materials: BTreeMap<String, MaterialDesc>,
+    /// Participating media by name.
+    #[serde(default, deserialize_with = "unique_names", skip_serializing_if = "BTreeMap::is_empty")]
+    pub media: BTreeMap<String, MediumDesc>,
+    /// The medium that is around everything, by its name in `media`: fog, water, air. Of lights at infinity nothing
+    /// gets through it, unless it absorbs and scatters nothing. Default: empty space.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub medium: Option<String>,
     /// Shapes in the world.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shapes: Vec<ShapeDesc>,

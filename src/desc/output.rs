@@ -106,7 +106,7 @@ pub enum LayerKind {
     Motion,
     /// Fraction of light scattered by the first surface.
     Albedo,
-    /// Light scattered once, by diffuse reflection. This and the seven that follow sum to the picture.
+    /// Light scattered once, by diffuse reflection. This and the nine that follow sum to the picture.
     DiffuseDirect,
     /// Light scattered more than once, the last time before the camera by diffuse reflection.
     DiffuseIndirect,
@@ -118,7 +118,11 @@ pub enum LayerKind {
     TransmissionDirect,
     /// Light scattered more than once, the last time before the camera through a surface.
     TransmissionIndirect,
-    /// Light given off by the surface that is seen.
+    /// Light scattered once, by a medium.
+    VolumeDirect,
+    /// Light scattered more than once, the last time before the camera by a medium.
+    VolumeIndirect,
+    /// Light given off by the surface that is seen, or by a medium before it.
     Emission,
     /// Light from infinity that is seen directly.
     Background,

@@ -148,7 +148,7 @@ macro_rules! part {
 
 impl LayerInfo {
     /// Every layer, in the order of files and of memory.
-    pub const ALL: [Self; 28] = [
+    pub const ALL: [Self; 30] = [
         Self::new(LayerKind::Color, "color", &["R", "G", "B", "A"], LayerSource::Color, ""),
         Self::new(
             LayerKind::Z,
@@ -210,7 +210,9 @@ impl LayerInfo {
         part!(SpecularIndirect, "specular_indirect", "light scattered more than once, last by specular reflection"),
         part!(TransmissionDirect, "transmission_direct", "light scattered once, through a surface"),
         part!(TransmissionIndirect, "transmission_indirect", "light scattered more than once, last through a surface"),
-        part!(Emission, "emission", "light given off by what is seen; sums with the seven others to RGB"),
+        part!(VolumeDirect, "volume_direct", "light scattered once, by a medium"),
+        part!(VolumeIndirect, "volume_indirect", "light scattered more than once, last by a medium"),
+        part!(Emission, "emission", "light given off by what is seen; sums with the nine others to RGB"),
         part!(Background, "background", "light from infinity that is seen directly"),
         Self::new(
             LayerKind::LightGroups,

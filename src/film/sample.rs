@@ -119,7 +119,11 @@ pub enum LightAov {
     TransmissionDirect,
     /// Scattered more than once, the last time before the camera through a surface.
     TransmissionIndirect,
-    /// Given off by the surface that the camera sees.
+    /// Scattered once, by a medium.
+    VolumeDirect,
+    /// Scattered more than once, the last time before the camera by a medium.
+    VolumeIndirect,
+    /// Given off by the surface that the camera sees, or by a medium before it.
     Emission,
     /// From infinity straight to the camera.
     Background,
@@ -127,7 +131,7 @@ pub enum LightAov {
 
 impl LightAov {
     /// How many there are.
-    pub const COUNT: usize = 8;
+    pub const COUNT: usize = 10;
 }
 
 /// Which light AOVs samples have.

@@ -23,6 +23,9 @@ impl Hit {
     /// The instance of shapes that are placed in the world directly.
     pub const NO_INSTANCE: InstanceId = InstanceId(u32::MAX);
 
+    /// In place of an instance: a medium has scattered the ray, whose id stands in place of the shape's.
+    pub const MEDIUM: InstanceId = InstanceId(u32::MAX - 1);
+
     /// The order in which ties are broken: by distance, then by ids, so that all own accelerators return the same
     /// hit.
     #[inline]

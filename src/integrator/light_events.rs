@@ -22,6 +22,8 @@ pub(super) enum LobeWeights {
     },
     /// Through the surface.
     Transmitted,
+    /// By a medium; the first surface is then that point.
+    Volume,
 }
 
 impl LobeWeights {
@@ -30,7 +32,13 @@ impl LobeWeights {
 
     /// Of light that does not meet a delta lobe, from `wi` to `wo`, both local.
     pub fn between(bsdf: &Bsdf, wo: Vec3, wi: Vec3) -> Self {
-        if wo.z * wi.z < 0.0 { Self::Transmitted } else { Self::Reflected { diffuse: bsdf.diffuse_fraction(wo, wi) } }
+        if matches!(bsdf, Bsdf::Phase(_)) {
+            Self::Volume
+        } else if wo.z * wi.z < 0.0 {
+            Self::Transmitted
+        } else {
+            Self::Reflected { diffuse: bsdf.diffuse_fraction(wo, wi) }
+        }
     }
 
     /// Of light from a direction that was chosen for `wo`.
@@ -67,18 +75,21 @@ pub(super) fn add_by_scattering(light_aovs: &mut LightAovRows, sample: usize, li
         return;
     }
     let mut add = |aov: LightAov, light: Rgb| light_aovs.add(sample, aov as usize, light);
-    let (lobes, [diffuse, specular, transmission]) = match event {
+    let (lobes, [diffuse, specular, transmission, volume]) = match event {
         LightEvent::Emission => return add(LightAov::Emission, light),
         LightEvent::Environment => return add(LightAov::Background, light),
         LightEvent::Direct(lobes) => {
-            (lobes, [LightAov::DiffuseDirect, LightAov::SpecularDirect, LightAov::TransmissionDirect])
+            use LightAov::{DiffuseDirect, SpecularDirect, TransmissionDirect, VolumeDirect};
+            (lobes, [DiffuseDirect, SpecularDirect, TransmissionDirect, VolumeDirect])
         }
         LightEvent::Indirect(lobes) => {
-            (lobes, [LightAov::DiffuseIndirect, LightAov::SpecularIndirect, LightAov::TransmissionIndirect])
+            use LightAov::{DiffuseIndirect, SpecularIndirect, TransmissionIndirect, VolumeIndirect};
+            (lobes, [DiffuseIndirect, SpecularIndirect, TransmissionIndirect, VolumeIndirect])
         }
     };
     match lobes {
         LobeWeights::Transmitted => add(transmission, light),
+        LobeWeights::Volume => add(volume, light),
         LobeWeights::Reflected { diffuse: share } => {
             let part = light * share;
             add(diffuse, part);

@@ -9,7 +9,7 @@ use crate::medium::{BoundaryMedia, MediumStack, RelativeIor};
 use crate::scene::Scene;
 
 /// Surfaces on one straight way, at most; a way along a surface must not go on for ever.
-const MAX_SURFACES: u32 = 4096;
+pub(super) const MAX_SURFACES: u32 = 4096;
 
 /// The unit direction in which the media around the camera are counted. No axis and no diagonal, where scenes have
 /// their edges and poles.
@@ -39,9 +39,9 @@ pub(super) struct MediumSegment {
 }
 
 /// A surface between two media.
-struct MediumBoundary {
-    sides: BoundaryMedia,
-    ior: RelativeIor,
+pub(super) struct MediumBoundary {
+    pub sides: BoundaryMedia,
+    pub ior: RelativeIor,
 }
 
 /// A box around all surfaces of media.
@@ -69,7 +69,12 @@ pub(super) fn crosses(at: &SurfaceInteraction, from: Vec3, to: Vec3) -> bool {
 
 impl World<'_> {
     /// The medium's boundary that a ray meets at a surface; `None` where the surface or this point of it is none.
-    fn boundary(&self, at: &SurfaceInteraction, direction: Vec3, state: &MediaState) -> Option<MediumBoundary> {
+    pub(super) fn boundary(
+        &self,
+        at: &SurfaceInteraction,
+        direction: Vec3,
+        state: &MediaState,
+    ) -> Option<MediumBoundary> {
         let medium = self.scene.surface(at.shape).medium?;
         if !self.scene.met_material(at, direction).flags().transmits() {
             return None;
@@ -94,6 +99,9 @@ impl World<'_> {
         to: Vec3,
         current: &MediumStack,
     ) -> MediumStack {
+        if at.instance == Hit::MEDIUM {
+            return *current;
+        }
         match self.scene.surface(at.shape).medium {
             Some(medium) if crosses(at, from, to) => {
                 let is_front = from.dot(at.n_g) < 0.0;

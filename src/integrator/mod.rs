@@ -10,6 +10,7 @@ mod cones;
 mod debug;
 mod light_events;
 mod media;
+mod participating;
 mod path;
 mod regularization;
 mod render_context;
@@ -54,6 +55,12 @@ pub mod dimensions {
 
     /// Choice of a colour (one), where dispersion parts them.
     pub const COLOR: u32 = u32::MAX - 1;
+
+    /// Of path tracing: choice of a channel (one) and the distance to a scattering by media (one), on the segment with
+    /// this many bounces before it.
+    pub const fn medium(bounce: u32) -> u32 {
+        (1 << 31) + bounce
+    }
 
     /// Of path tracing: choice of a light (one, and one for its last digits) and a direction towards it (two), at the
     /// vertex with this many bounces before it.

@@ -3,7 +3,7 @@
 use super::cancel::Cancel;
 use super::cones::scattered;
 use crate::geometry::SurfaceInteraction;
-use crate::math::{Ray, RayCone, Vec2, Vec3};
+use crate::math::{DVec3, Ray, RayCone, Vec2, Vec3};
 use crate::scene::Scene;
 
 /// What a render adds to a scene.
@@ -76,6 +76,12 @@ impl<'a> RenderContext<'a> {
     pub(super) fn motion_of(&self, at: &SurfaceInteraction) -> Vec2 {
         let Scene { camera, geometry, features, .. } = self.scene;
         if features.motion { camera.film_motion(geometry.ends_of_motion(at), self.size) } else { Vec2::ZERO }
+    }
+
+    /// How far a point at rest moves in the picture while the shutter is open, in pixels to the right and down.
+    pub(super) fn motion_of_point(&self, p: DVec3) -> Vec2 {
+        let Scene { camera, features, .. } = self.scene;
+        if features.motion { camera.film_motion([p; 2], self.size) } else { Vec2::ZERO }
     }
 
     /// How far what lies infinitely far away in a direction moves in the picture while the shutter is open.

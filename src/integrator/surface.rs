@@ -48,6 +48,19 @@ pub(super) fn geometry_aovs(
     sample
 }
 
+/// What the layers need of the place where a medium scatters a camera ray.
+pub(super) fn medium_aovs(pass: &PassContext, surface_aovs: SurfaceAovs, at: &SurfaceInteraction) -> SurfaceSample {
+    let (camera, mut sample) = (&pass.world.scene.camera, SurfaceSample::default());
+    if surface_aovs.geometry {
+        sample.depth = camera.depth(at.p, at.time);
+        sample.position = camera.render_space().world_point(at.p).as_vec3();
+    }
+    if surface_aovs.motion {
+        sample.motion = pass.render.motion_of_point(at.p).to_array();
+    }
+    sample
+}
+
 /// The first surface of a camera ray.
 pub(super) struct FirstSurface<'a> {
     pub ray: &'a Ray,

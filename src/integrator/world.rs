@@ -163,8 +163,12 @@ impl<'a> World<'a> {
     }
 
     /// Moves camera rays that start far outside the scene along themselves (in `f64`) to just before the scene's box:
-    /// accelerators compute in `f32` and lose as many digits as the origin is far away.
+    /// accelerators compute in `f32` and lose as many digits as the origin is far away. Within a medium that is around
+    /// everything they stay where they are.
     pub fn clip_to_scene(&self, rays: &mut RayRows, count: usize) {
+        if self.scene.media.has_surroundings() {
+            return;
+        }
         vectorize!(clip_to_scene(self.bounds, self.reach_squared, rays, count));
     }
 }

@@ -43,6 +43,10 @@ pub(super) struct CausticPass {
 impl CausticPass {
     /// For a scene; `None` if nothing in it can cast caustics, or if the camera sees nothing.
     pub fn new(scene: &Scene, accel: &dyn Accelerator, settings: &Settings) -> Option<Self> {
+        if scene.features.participating_media {
+            tracing::warn!("photons are not traced through media that scatter or give off light");
+            return None;
+        }
         let casters = CausticCasters::new(scene)?;
         let [width, height] = settings.size.map(f64::from);
         let traced = (PHOTONS_PER_PIXEL * width * height).clamp(*PHOTONS.start(), *PHOTONS.end()) as u32;

@@ -6,6 +6,7 @@ mod diffuse;
 mod energy;
 mod limits;
 mod microfacet;
+mod phase;
 mod principled;
 mod rows;
 mod sampling;

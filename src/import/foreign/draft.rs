@@ -7,8 +7,8 @@ use std::sync::Arc;
 use super::{ImportReport, Imported, Outcome, ReportEntry};
 use crate::assets::{Assets, MeshData, RgbImage};
 use crate::desc::{
-    CameraDesc, InstanceDesc, KeyframeDesc, LightDesc, MaterialDesc, ObjectDesc, SceneDesc, ShapeDesc, TextureDesc,
-    TransformDesc, TransformStepDesc,
+    CameraDesc, InstanceDesc, KeyframeDesc, LightDesc, MaterialDesc, MediumDesc, ObjectDesc, SceneDesc, ShapeDesc,
+    TextureDesc, TransformDesc, TransformStepDesc,
 };
 use crate::image_data::ImageData;
 use crate::math::{DAffine3, DMat3, DVec3, Transform};
@@ -51,6 +51,14 @@ impl Draft {
         let name = self.numbers.unique("material", name, |name| self.desc.materials.contains_key(name));
         self.places.insert(format!("materials.{name}"), place.into());
         self.desc.materials.insert(name.clone(), material);
+        name
+    }
+
+    /// Adds a medium under `name` or one like it; the result is its name.
+    pub fn add_medium(&mut self, name: &str, place: &str, medium: MediumDesc) -> String {
+        let name = self.numbers.unique("medium", name, |name| self.desc.media.contains_key(name));
+        self.places.insert(format!("media.{name}"), place.into());
+        self.desc.media.insert(name.clone(), medium);
         name
     }
 

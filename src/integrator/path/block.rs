@@ -4,7 +4,7 @@ use super::Context;
 use super::materials::BsdfTable;
 use crate::bsdf::{BsdfEval, Lambert};
 use crate::color::Rgb;
-use crate::geometry::{SpawnPoint, SurfaceInteraction, WorldNormalRows, WorldPointRows};
+use crate::geometry::{Hit, SpawnPoint, SurfaceInteraction, WorldNormalRows, WorldPointRows};
 use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::integrator::light_events::LobeWeights;
 use crate::light::{LightSampleContext, LightSampleRows};
@@ -21,6 +21,8 @@ pub(super) mod vertex_flags {
     pub const TRANSMITS: u32 = 2;
     /// There is no surface, although the accelerator found a hit.
     pub const MISS: u32 = 4;
+    /// A medium scatters here, whose id is in place of the shape's.
+    pub const MEDIUM: u32 = 8;
 }
 
 /// What has become of a ray that a vertex was to spawn.
@@ -284,6 +286,12 @@ impl Vertices {
     #[inline(always)]
     pub fn is_miss(&self, lane: usize) -> bool {
         self.rows.flags[lane] & vertex_flags::MISS != 0
+    }
+
+    /// Whether there is a point of a medium in place of a surface.
+    #[inline(always)]
+    pub fn is_medium(&self, lane: usize) -> bool {
+        self.rows.instance[lane] == Hit::MEDIUM.0
     }
 
     /// The BSDF and its density for the local direction `wi`.

@@ -40,7 +40,9 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
     if context.scene.features.shading_normals {
         wave.counts.shadow += offset_below_facets(context, vertices, terminator_rays);
     }
-    if context.scene.features.media {
+    if context.scene.features.participating_media {
+        wave.counts.shadow += super::media::trace_shadow_rays(context, vertices, media, block);
+    } else if context.scene.features.media {
         super::media::absorb_direct(context, vertices, media, block);
     }
 }

@@ -5,7 +5,7 @@ use super::block::{VertexRows, Vertices, vertex_flags};
 use super::wave::{Wave, path_flags};
 use crate::bsdf::{Bsdf, BsdfQueryRows, Lambert};
 use crate::color::Rgb;
-use crate::id::ShapeId;
+use crate::id::{MediumId, ShapeId};
 use crate::material::Material;
 use crate::math::compact::sort_lanes;
 use crate::math::rows::{BATCH, Row};
@@ -83,8 +83,8 @@ pub(super) fn evaluate(context: &Context, wave: &mut Wave, block: usize) {
     vertices.textured.clear();
     let scene = context.scene;
     for lane in 0..vertices.count.min(BATCH) {
-        if vertices.is_miss(lane) {
-            set_diffuse(vertices, lane, Rgb::BLACK);
+        if vertices.rows.flags[lane] & (vertex_flags::MISS | vertex_flags::MEDIUM) != 0 {
+            evaluate_without_surface(scene, vertices, lane);
             continue;
         }
         let surface = scene.surface(ShapeId(vertices.rows.shape[lane]));
@@ -106,6 +106,19 @@ pub(super) fn evaluate(context: &Context, wave: &mut Wave, block: usize) {
     }
     find_footprints(context, wave, block);
     evaluate_textured(context, &mut wave.vertices);
+}
+
+/// Sets the scattering of a medium, or nothing where the ray met nothing.
+#[inline(never)]
+fn evaluate_without_surface(scene: &Scene, vertices: &mut Vertices, lane: usize) {
+    if vertices.is_miss(lane) {
+        set_diffuse(vertices, lane, Rgb::BLACK);
+        return;
+    }
+    let phase = scene.media.get(MediumId(vertices.rows.shape[lane])).phase;
+    set_non_diffuse(&mut vertices.rows, &mut vertices.non_diffuse, lane, &Bsdf::Phase(phase));
+    vertices.rows.flags[lane] |= vertex_flags::MEDIUM;
+    vertices.bsdfs.set_made(lane, Bsdf::Phase(phase));
 }
 
 /// Finds the footprints of vertices with textures, and starts to load the texels below them: they then wait for memory

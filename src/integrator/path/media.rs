@@ -2,10 +2,14 @@
 
 use super::Context;
 use super::block::{Vertices, spawn};
-use super::wave::{Wave, path_flags};
+use super::radiance::Output;
+use super::wave::{PathRows, Wave, path_flags};
 use crate::color::Rgb;
 use crate::integrator::dimensions;
+use crate::integrator::light_events::LightEvent;
 use crate::integrator::media::MediaState;
+use crate::integrator::participating::{DistanceSample, ShadowEnd};
+use crate::light::light_target;
 use crate::math::Ray;
 use crate::math::rows::BATCH;
 use crate::medium::RelativeIor;
@@ -34,19 +38,108 @@ pub(super) fn pass_boundaries(context: &Context, wave: &mut Wave) -> u64 {
             }
             rays[block].set(i, &ray);
         }
-        if matches!(segment.ior, Some(RelativeIor::Dispersed(_))) {
-            // The path follows one of the colours, which are refracted differently.
-            let seed = PixelSeed(paths.seed[i]);
-            let channel =
-                ((3.0 * context.config.sampler.sample_4d(seed, paths.sample[i], dimensions::COLOR)[0]) as usize).min(2);
-            let mut only = [0.0; 3];
-            only[channel] = 3.0;
-            paths.throughput.set(i, paths.throughput.get(i) * Rgb::from(only));
-            state.channel = Some(channel);
-        }
-        state.ior = segment.ior.map(|ior| ior.of(state.channel));
+        arrive(context, paths, i, state, segment.ior);
     }
     passed
+}
+
+/// Arrives at a surface, of this relative index of refraction if it is a boundary between media.
+fn arrive(context: &Context, paths: &mut PathRows, i: usize, state: &mut MediaState, ior: Option<RelativeIor>) {
+    if matches!(ior, Some(RelativeIor::Dispersed(_))) {
+        // The path follows one of the colours, which are refracted differently.
+        let seed = PixelSeed(paths.seed[i]);
+        let channel =
+            ((3.0 * context.config.sampler.sample_4d(seed, paths.sample[i], dimensions::COLOR)[0]) as usize).min(2);
+        let mut only = [0.0; 3];
+        only[channel] = 3.0;
+        paths.throughput.set(i, paths.throughput.get(i) * Rgb::from(only));
+        state.channel = Some(channel);
+    }
+    state.ior = ior.map(|ior| ior.of(state.channel));
+}
+
+/// Takes every path to the next point of a medium or surface that scatters it, and adds what media give off on the way;
+/// the result is how many more rays that took.
+#[inline(never)]
+pub(super) fn scatter(context: &Context, wave: &mut Wave, out: &mut Output) -> u64 {
+    let mut passed = 0;
+    for index in 0..wave.count {
+        let (block, i) = (index / BATCH, index % BATCH);
+        let Wave { paths, rays, hits, media, cones, light_aovs, .. } = wave;
+        let (paths, state) = (&mut paths[block], &mut media[index]);
+        let mut ray = rays[block].get(i);
+        let (start, throughput) = (ray.origin, paths.throughput.get(i));
+        let u = context.config.sampler.sample_4d(
+            PixelSeed(paths.seed[i]),
+            paths.sample[i],
+            dimensions::medium(context.bounce),
+        );
+        let sample = DistanceSample::new(throughput, [u[0], u[1]]);
+        let path = context.world.trace_through_media(&mut ray, hits[block].get(i), state, sample);
+        hits[block].set(i, path.hit);
+        if !path.emitted.is_black() {
+            let light = context.config.clamped(throughput * path.emitted, context.bounce);
+            let event = light_aovs.event(context.bounce, index, LightEvent::Emission);
+            out.add_without_light(context, paths.slot[i], light, event);
+        }
+        paths.throughput.set(i, throughput * path.weight);
+        light_aovs.absorb(index, path.weight);
+        if path.passed > 0 {
+            passed += u64::from(path.passed);
+            if let Some(cone) = cones.get_mut(index) {
+                *cone = cone.moved((ray.origin - start).length());
+            }
+            rays[block].set(i, &ray);
+        }
+        arrive(context, paths, i, state, path.ior);
+    }
+    passed
+}
+
+/// Follows the shadow rays of a block's vertices through media to their lights, and multiplies what they contribute by
+/// what is left of it; the result is how many rays that took.
+#[inline(never)]
+pub(super) fn trace_shadow_rays(context: &Context, vertices: &mut Vertices, media: &[MediaState], block: usize) -> u64 {
+    let mut traced = 0;
+    for lane in 0..vertices.count {
+        if vertices.direct.status[lane] != spawn::SPAWNED {
+            continue;
+        }
+        let (ray, state) = shadow_ray(context, vertices, media, block, lane);
+        let target = vertices.light_target(lane);
+        let end = match vertices.light_samples.target[lane] {
+            light_target::POINT => ShadowEnd::Point(&target),
+            _ => ShadowEnd::Infinity,
+        };
+        let (left, rays) = context.world.light_transmittance(&ray, &end, state);
+        traced += rays;
+        let direct = &mut vertices.direct;
+        direct.contribution.set(lane, direct.contribution.get(lane) * left);
+        if left.is_black() {
+            direct.status[lane] = spawn::NONE;
+        }
+    }
+    traced
+}
+
+/// The shadow ray of a vertex, and the media at its start.
+fn shadow_ray(
+    context: &Context,
+    vertices: &Vertices,
+    media: &[MediaState],
+    block: usize,
+    lane: usize,
+) -> (Ray, MediaState) {
+    let direct = &vertices.direct;
+    let ray = Ray {
+        t_max: direct.shadow_end[lane],
+        time: vertices.rows.time[lane],
+        ..Ray::new(direct.shadow_origin.get(lane), direct.shadow_direction.get(lane))
+    };
+    let state = media[block * BATCH + vertices.path(lane)];
+    let (at, from) = (vertices.interaction(lane), vertices.rows.direction.get(lane));
+    let current = context.world.media_toward(&at, from, ray.direction, &state.current);
+    (ray, MediaState { current, ..state })
 }
 
 /// Multiplies what the shadow rays of a block's vertices contribute by the transmittance of the media on their way.
@@ -55,20 +148,9 @@ pub(super) fn absorb_direct(context: &Context, vertices: &mut Vertices, media: &
         if vertices.direct.status[lane] != spawn::SPAWNED {
             continue;
         }
-        let at = vertices.interaction(lane);
-        let from = vertices.rows.direction.get(lane);
+        let (ray, MediaState { current, .. }) = shadow_ray(context, vertices, media, block, lane);
         let direct = &mut vertices.direct;
-        let ray = Ray {
-            t_max: direct.shadow_end[lane],
-            ..Ray::new(direct.shadow_origin.get(lane), direct.shadow_direction.get(lane))
-        };
-        let inside = context.world.media_toward(
-            &at,
-            from,
-            ray.direction,
-            &media[block * BATCH + vertices.rows.path[lane] as usize].current,
-        );
-        direct.contribution.set(lane, direct.contribution.get(lane) * context.world.transmittance(&inside, &ray));
+        direct.contribution.set(lane, direct.contribution.get(lane) * context.world.transmittance(&current, &ray));
     }
 }
 

@@ -166,7 +166,9 @@ impl PathIntegrator {
             (context.bounce, context.is_last) = (bounce, bounce + 1 >= self.max_depth);
             let context = &context;
             trace::closest(context, wave, counts);
-            if context.scene.features.media {
+            if context.scene.features.participating_media {
+                counts.indirect += media::scatter(context, wave, out);
+            } else if context.scene.features.media {
                 counts.indirect += media::pass_boundaries(context, wave);
             }
             let mut survivors = 0;

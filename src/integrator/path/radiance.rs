@@ -24,6 +24,16 @@ impl Output<'_> {
         self.add_to_group_of(context, slot, light, id);
     }
 
+    /// Adds light that no light of the scene gives to a sample and its light AOVs.
+    pub fn add_without_light(&mut self, context: &Context, slot: u32, light: Rgb, event: LightEvent) {
+        self.add(slot, light);
+        if context.config.needs_light_aovs() {
+            self.add_by_scattering(slot, light, event);
+            let last = context.scene.light_groups.names().len();
+            add_by_group(&mut self.batch.light_aovs, slot as usize, light, last);
+        }
+    }
+
     /// Adds light to the light AOVs by scattering of a sample.
     pub fn add_by_scattering(&mut self, slot: u32, light: Rgb, event: LightEvent) {
         add_by_scattering(&mut self.batch.light_aovs, slot as usize, light, event);

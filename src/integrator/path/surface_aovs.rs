@@ -7,7 +7,8 @@ use super::wave::Wave;
 use crate::color::Rgb;
 use crate::film::SurfaceSample;
 use crate::geometry::SurfaceInteraction;
-use crate::integrator::surface::{geometry_aovs, set_features};
+use crate::id::MediumId;
+use crate::integrator::surface::{geometry_aovs, medium_aovs, set_features};
 use crate::math::rows::BATCH;
 use crate::math::{Frame, Vec3};
 
@@ -36,6 +37,10 @@ fn write_surfaces(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
         }
         let at = vertices.interaction(lane);
         let surface = &mut out.batch.surfaces[paths[block].slot[i] as usize];
+        if vertices.is_medium(lane) {
+            set_medium(context, surface, &at, features);
+            continue;
+        }
         if context.bounce == 0 {
             *surface = geometry_aovs(context.pass, surface_aovs, &at, hits[block].get(i).as_ref());
         }
@@ -48,6 +53,18 @@ fn write_surfaces(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
                 set_features(surface, throughput, albedo, at.n_s);
             }
         }
+    }
+}
+
+/// Sets the AOVs of a point where a medium scatters: it has no normal, no shape and no parameters.
+fn set_medium(context: &Context, surface: &mut SurfaceSample, at: &SurfaceInteraction, features: Option<Rgb>) {
+    let albedo = context.scene.media.get(MediumId(at.shape.0)).albedo();
+    if context.bounce == 0 {
+        *surface = medium_aovs(context.pass, context.config.surface_aovs, at);
+        surface.albedo = albedo;
+    }
+    if let Some(throughput) = features {
+        set_features(surface, throughput, albedo, Vec3::ZERO);
     }
 }
 

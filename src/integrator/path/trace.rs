@@ -31,14 +31,19 @@ pub(super) fn closest(context: &Context, wave: &mut Wave, counts: &mut RayCounts
 /// Traces the shadow rays of the wave and adds the light of those that nothing blocks.
 pub(super) fn shadow(context: &Context, wave: &mut Wave, out: &mut Output, counts: &mut RayCounts) {
     let shadows = &mut wave.shadows;
-    counts.shadow += shadows.count as u64;
+    if !context.scene.features.participating_media {
+        counts.shadow += shadows.count as u64;
+    }
     let toward_one_place = context.bounce == 0 && !context.scene.features.environment;
     let coherence = if toward_one_place { Coherence::Coherent } else { Coherence::Incoherent };
     let mut occluded = [false; BATCH];
     for (block, rays) in shadows.rays.iter().enumerate().take(shadows.count.div_ceil(BATCH)) {
         let first = block * BATCH;
         let count = BATCH.min(shadows.count - first);
-        context.world.accel.occluded_rows(rays, count, &mut occluded, coherence);
+        // Media have been asked already.
+        if !context.scene.features.participating_media {
+            context.world.accel.occluded_rows(rays, count, &mut occluded, coherence);
+        }
         for (i, _) in (first..).zip(&occluded[..count]).filter(|(_, occluded)| !**occluded) {
             let rows = &shadows.rows[block];
             let (slot, light) = (rows.slot[i % BATCH], rows.contribution.get(i % BATCH));

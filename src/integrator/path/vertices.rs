@@ -11,7 +11,7 @@ use crate::integrator::shading::{adapted_normal, is_consistent};
 use crate::math::compact::{Compaction, collect_lanes, sort_lanes};
 use crate::math::rows::{BATCH, Element, Row, Vec3Rows};
 use crate::math::vectorize::vectorize;
-use crate::math::{Frame, RayRows, Vec2};
+use crate::math::{Frame, Ray, RayRows, Vec2};
 
 /// Finds the vertices of a block's paths, and which paths miss.
 pub(super) fn find(context: &Context, wave: &mut Wave, block: usize) {
@@ -54,6 +54,10 @@ pub(super) fn find(context: &Context, wave: &mut Wave, block: usize) {
     for lane in 0..vertices.count.min(BATCH) {
         if vertices.rows.is_unresolved[lane] != 0 {
             let path = vertices.path(lane);
+            if vertices.is_medium(lane) {
+                set_medium_vertex(vertices, lane, &rays.get(path), hits.t[path]);
+                continue;
+            }
             match context.world.resolve(&rays.get(path), hits.get(path)) {
                 Some(at) => vertices.set_interaction(lane, &at),
                 None => {
@@ -64,6 +68,18 @@ pub(super) fn find(context: &Context, wave: &mut Wave, block: usize) {
             }
         }
     }
+}
+
+/// Sets the vertex where a medium scatters a ray: a point with a normal against it.
+#[inline(never)]
+fn set_medium_vertex(vertices: &mut Vertices, lane: usize, ray: &Ray, t: f32) {
+    let n = -ray.direction.normalize();
+    let rows = &mut vertices.rows;
+    vertices.points.p.set(lane, ray.origin.as_dvec3() + ray.direction.as_dvec3() * f64::from(t));
+    (rows.t[lane], rows.error[lane]) = (t, 0.0);
+    rows.n_g.set(lane, n);
+    rows.n_s.set(lane, n);
+    rows.flags[lane] = vertex_flags::MEDIUM;
 }
 
 /// Starts a vertex for each of the chosen paths.
@@ -222,7 +238,7 @@ pub(super) fn build_frames(context: &Context, wave: &mut Wave) {
     }
     if features.normal_perturbations {
         for lane in 0..count {
-            if vertices.is_miss(lane) {
+            if vertices.is_miss(lane) || vertices.is_medium(lane) {
                 continue;
             }
             let at = vertices.interaction(lane);

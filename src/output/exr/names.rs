@@ -13,6 +13,8 @@ const BLENDER_PASSES: &[(&str, &str)] = &[
     ("specular_indirect", "Glossy Indirect"),
     ("transmission_direct", "Transmission Direct"),
     ("transmission_indirect", "Transmission Indirect"),
+    ("volume_direct", "Volume Direct"),
+    ("volume_indirect", "Volume Indirect"),
     ("emission", "Emission"),
     ("background", "Environment"),
     ("noisy", "Noisy Image"),

@@ -140,6 +140,7 @@ impl<'a> Reader<'a> {
                     transmission_tint: self.color(element, "specular_transmittance", 1.0, uv)?,
                     priority: None,
                     absorption: None,
+                    medium: None,
                     abbe: None,
                 };
                 (MaterialDesc::Dielectric(Box::new(glass)), false)

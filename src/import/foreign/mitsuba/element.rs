@@ -175,6 +175,18 @@ impl<'a> Element<'a> {
         }
     }
 
+    /// As [`Self::ignored`], of all nested plugins of a class that have no outcome yet.
+    pub fn ignored_other_plugins(&mut self, class: &str, why: &str) -> Result<()> {
+        for (property, outcome) in self.plugin.properties.iter().zip(&mut self.outcomes) {
+            if let Some(id) = self.document.plugin_of(property)?
+                && self.document.plugins[id.0].class == class
+            {
+                outcome.get_or_insert_with(|| (Outcome::Ignored, why.into()));
+            }
+        }
+        Ok(())
+    }
+
     /// As [`Self::ignored`], of all nested plugins of a class.
     pub fn ignored_plugins(&mut self, class: &str, why: &str) -> Result<()> {
         for (property, outcome) in self.plugin.properties.iter().zip(&mut self.outcomes) {

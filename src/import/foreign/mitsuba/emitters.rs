@@ -22,7 +22,7 @@ impl<'a> Reader<'a> {
     /// Reads an emitter that is no shape.
     pub(super) fn emitter(&mut self, id: PluginId) -> Result<()> {
         let mut element = Element::new(self.document, id);
-        element.ignored_plugins("medium", "participating media are unsupported: left out")?;
+        self.medium_outside(&mut element)?;
         // Which light is sampled how often does not change the picture.
         element.float("sampling_weight")?;
         let light = match element.kind() {

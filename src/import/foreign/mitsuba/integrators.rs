@@ -49,8 +49,8 @@ impl Reader<'_> {
             }
             "volpath" | "volpathmis" | "prbvolpath" => {
                 self.draft.desc.integrator = path(&mut element)?;
-                if self.document.plugins.iter().any(|plugin| plugin.class == "medium") {
-                    element.approximated("", "path tracing: there are no participating media");
+                if kind == "prbvolpath" {
+                    element.approximated("", "path tracing, without derivatives");
                 }
             }
             "ptracer" => {

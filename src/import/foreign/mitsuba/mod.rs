@@ -8,6 +8,7 @@ mod bsdfs;
 mod element;
 mod emitters;
 mod integrators;
+mod media;
 mod meshes;
 mod names;
 mod principled;
@@ -47,6 +48,10 @@ pub fn read(path: &Path, options: &ImportOptions) -> Result<Imported> {
         groups: BTreeMap::new(),
         reliefs: BTreeSet::new(),
         black: None,
+        media: BTreeMap::new(),
+        containers: BTreeMap::new(),
+        media_inside: BTreeSet::new(),
+        media_outside: BTreeSet::new(),
         open: Vec::new(),
     };
     reader.scene()?;
@@ -70,6 +75,15 @@ struct Reader<'a> {
     reliefs: BTreeSet<String>,
     /// The material that reflects nothing.
     black: Option<String>,
+    /// What media have become; none where they are unsupported.
+    media: BTreeMap<PluginId, Option<String>>,
+    /// Materials of surfaces of media, by those of the surface, the names of the media inside, and whether another is
+    /// outside.
+    containers: BTreeMap<(String, Option<String>, bool), String>,
+    /// Media that are inside of some shape,
+    media_inside: BTreeSet<String>,
+    /// and outside of some, or around a camera or a light.
+    media_outside: BTreeSet<String>,
     /// Plugins on the way to the one that is read.
     open: Vec<PluginId>,
 }
@@ -106,7 +120,9 @@ impl Reader<'_> {
                 }
                 ("shape", _) => self.world_shape(id)?,
                 ("emitter", _) => self.emitter(id)?,
-                ("medium" | "phase" | "volume", _) => self.whole(id, "participating media are unsupported: left out"),
+                ("medium" | "phase" | "volume", _) if !self.shows_media() => {
+                    self.whole(id, "the integrator shows no participating media: left out");
+                }
                 // What others refer to is read when they do.
                 _ => {}
             }
@@ -114,6 +130,7 @@ impl Reader<'_> {
         if !has_sensor {
             return Err(scene.place.error("the scene has no sensor of type perspective, thinlens or orthographic"));
         }
+        self.surround();
         if !has_integrator {
             self.draft.desc.integrator = integrators::unlimited_path();
         }

@@ -81,7 +81,7 @@ impl Reader<'_> {
             element.ignored("srf", "the camera sees red, green and blue");
         }
         camera.transform = Some(placement(&mut element, &map)?);
-        element.ignored_plugins("medium", "participating media are unsupported: left out")?;
+        self.medium_outside(&mut element)?;
         let place = element.place().to_string();
         element.finish(&mut self.draft);
         self.draft.set_camera(&place, camera);

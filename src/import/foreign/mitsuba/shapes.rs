@@ -120,7 +120,14 @@ impl<'a> Reader<'a> {
         };
         let flipped = element.boolean("flip_normals", false)?;
         let bsdf = element.one("bsdf")?;
-        let (material, mut opacity) = self.surface(bsdf, &place, uv)?;
+        let (mut material, mut opacity) = self.surface(bsdf, &place, uv)?;
+        let interface = self.medium_interface(&mut element)?;
+        if let Some(container) = self.container(bsdf, &material, &interface) {
+            (material, opacity) = (container, None);
+            self.media_inside.extend(interface.inside);
+        } else if interface.inside.is_some() {
+            element.ignored("interior", "what is within an opaque surface cannot be seen");
+        }
         if let ShapeDesc::Mesh(mesh) = &mut shape
             && self.has_image(id, &mut BTreeSet::new())
         {
@@ -133,7 +140,6 @@ impl<'a> Reader<'a> {
         if emission.is_some() && opacity.take().is_some() {
             element.ignored("", "what gives off light has no holes");
         }
-        element.ignored_plugins("medium", "participating media are unsupported: left out")?;
         element.ignored_plugins("sensor", "a sensor on a shape is no camera")?;
         // How often silhouettes are sampled for derivatives.
         element.float("silhouette_sampling_weight")?;

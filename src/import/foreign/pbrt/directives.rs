@@ -9,9 +9,10 @@ use super::camera::{self, CameraDirective};
 use super::colors::{ColorSpace, Colors};
 use super::lights::Lights;
 use super::materials::Materials;
+use super::media::{MediumInterface, MediumTable};
 use super::options::{self, Typed};
 use super::params::{Params, Values};
-use super::shapes::Shapes;
+use super::shapes::{Directive, Shapes};
 use super::state::{Ctm, Graphics, MAX_DEPTH, Material, ShapeMaterial, Times, World};
 use super::textures::{TextureDirective, Textures};
 use super::tokens::{Lexer, Position, TokenKind};
@@ -62,6 +63,7 @@ pub(crate) struct Reader {
     /// Names in the scene by those in the file; `None` if nothing of the object can be seen.
     objects: BTreeMap<String, Option<String>>,
     object: Option<Object>,
+    media: MediumTable,
 }
 
 impl Reader {
@@ -86,6 +88,7 @@ impl Reader {
             materials: BTreeMap::new(),
             objects: BTreeMap::new(),
             object: None,
+            media: MediumTable::default(),
         }
     }
 
@@ -118,6 +121,7 @@ impl Reader {
                 return Err(lexer.error(at, "there is no WorldBegin"));
             }
         }
+        self.media.finish(&mut self.draft);
         Ok(self.draft.finish())
     }
 
@@ -208,17 +212,14 @@ impl Reader {
                 self.option(lexer, at, directive)?;
             }
             "ObjectBegin" | "ObjectEnd" | "ObjectInstance" => self.object(lexer, at, directive)?,
-            "MediumInterface" => {
-                quoted(lexer, at, "a medium")?;
-                if lexer.peek()?.is_some_and(|token| token.kind == TokenKind::Quoted) {
-                    lexer.take()?;
-                }
-                self.draft.ignored(&lexer.place(at), directive, "", "there is nothing between surfaces");
-            }
+            "MediumInterface" => self.graphics.media = Rc::new(MediumInterface::read(lexer, at)?),
             "MakeNamedMedium" => {
                 let name = quoted(lexer, at, "a name")?;
                 let params = self.params(lexer, at, format!("{directive} \"{name}\""))?;
-                self.draft.ignored(&params.place, &params.element, "", "there is nothing between surfaces");
+                let params =
+                    params.with_defaults(self.graphics.attributes.get("medium").map_or(&[][..], Vec::as_slice));
+                let colors = Colors { folder: &self.folder, space: self.graphics.color_space };
+                self.media.define(&mut self.draft, &name, &params, &colors)?;
             }
             "Material" | "MakeNamedMaterial" | "NamedMaterial" => self.material(lexer, at, directive)?,
             "Texture" => self.texture(lexer, at)?,
@@ -301,6 +302,7 @@ impl Reader {
             "Sampler" => "Sampler",
             "Integrator" => "Integrator",
             "Camera" => {
+                self.media.surround(&mut self.draft, &params, &self.graphics.media.outside);
                 if let Some(inverse) = self.graphics.ctm.inverse() {
                     self.coordinate_systems.insert("camera".into(), inverse);
                 }
@@ -328,6 +330,7 @@ impl Reader {
         options::set_filter(draft, get("PixelFilter"))?;
         options::set_sampler(draft, get("Sampler"))?;
         options::set_integrator(draft, get("Integrator"))?;
+        self.media.are_hidden = get("Integrator").is_some_and(|i| matches!(i.kind.as_str(), "path" | "simplepath"));
         let size = [draft.desc.film.width, draft.desc.film.height];
         let default = || {
             let params = Params::none(lexer, at, "Camera perspective".into());
@@ -467,7 +470,13 @@ impl Reader {
         let world = if in_object { World { mirrored: false, ..self.world } } else { self.world };
         let colors = Colors { folder: &self.folder, space: self.graphics.color_space };
         let shapes = Shapes { textures: &self.textures, colors, world, scene: &self.scene, in_object };
-        let Some(shape) = shapes.read(&mut self.draft, &kind, &params, &self.graphics)? else { return Ok(()) };
+        let read = shapes.read(
+            &mut self.draft,
+            &mut self.media,
+            Directive { kind: &kind, params: &params },
+            &self.graphics,
+        )?;
+        let Some(shape) = read else { return Ok(()) };
         match &mut self.object {
             Some(object) => object.shapes.push((params.place, shape)),
             None => self.draft.add_shape(&params.place, shape),
@@ -477,7 +486,7 @@ impl Reader {
 }
 
 /// A string that has to follow.
-fn quoted(lexer: &mut Lexer, at: Position, what: &str) -> Result<String> {
+pub(super) fn quoted(lexer: &mut Lexer, at: Position, what: &str) -> Result<String> {
     match lexer.take()? {
         Some(token) if token.kind == TokenKind::Quoted => Ok(lexer.string(&token)),
         Some(token) => Err(lexer.error(token.at, format!("expected {what} in quotes, not {}", lexer.text(&token)))),

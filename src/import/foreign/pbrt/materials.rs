@@ -90,6 +90,7 @@ impl Materials<'_> {
             transmission_tint: ColorDesc::Grey(1.0),
             priority: None,
             absorption: None,
+            medium: None,
             abbe,
         })))
     }

@@ -8,6 +8,7 @@ mod directives;
 mod lights;
 mod loop_subdivision;
 mod materials;
+mod media;
 mod octahedral;
 mod options;
 mod params;

@@ -159,10 +159,7 @@ pub fn set_integrator(draft: &mut Draft, integrator: Option<&Typed>) -> Result<(
             return Ok(());
         }
         match kind.as_str() {
-            "path" => {}
-            "volpath" | "simplevolpath" => {
-                draft.approximated(&params.place, &params.element, "", "path tracing without volumes");
-            }
+            "path" | "volpath" | "simplevolpath" => {}
             "bdpt" | "mlt" | "sppm" | "simplepath" | "lightpath" | "randomwalk" => {
                 draft.approximated(
                     &params.place,

@@ -7,8 +7,9 @@ use super::area_light::{AreaLight, Extent};
 use super::bilinear::Patches;
 use super::colors::Colors;
 use super::loop_subdivision;
+use super::media::MediumTable;
 use super::params::Params;
-use super::state::{Graphics, ShapeMaterial, World};
+use super::state::{Ctm, Graphics, ShapeMaterial, World};
 use super::textures::Textures;
 use super::triangles;
 use crate::assets::{MeshData, read_ply_attributes};
@@ -37,6 +38,15 @@ pub struct Shapes<'a> {
     pub in_object: bool,
 }
 
+/// The directive of a shape.
+#[derive(Clone, Copy)]
+pub struct Directive<'a> {
+    /// The kind of shape.
+    pub kind: &'a str,
+    /// Its parameters.
+    pub params: &'a Params,
+}
+
 /// A shape's form.
 enum Form {
     /// A Steradian shape, after a transform of its own; pbrt turns its normals inside out where the transform mirrors.
@@ -45,6 +55,27 @@ enum Form {
     Mesh(MeshData, usize),
     /// Triangles of a file that can stay there.
     File(String),
+}
+
+/// The transforms of a shape; what gives off light does not move.
+fn still_if_lit(draft: &mut Draft, params: &Params, mut ctm: Ctm, is_light: bool) -> Ctm {
+    if is_light && ctm.is_moving() {
+        let how = "what gives off light stands still where it is at first";
+        draft.approximated(&params.place, &params.element, "transform", how);
+        ctm.0[1] = ctm.0[0];
+    }
+    ctm
+}
+
+/// The material of a shape that has a medium inside.
+fn container(draft: &mut Draft, media: &mut MediumTable, params: &Params, graphics: &Graphics) -> Option<String> {
+    let own = match graphics.material.as_deref() {
+        Some(ShapeMaterial::Interface) => None,
+        Some(ShapeMaterial::Material(material)) => Some(material.name.as_str()),
+        // Diffuse.
+        None => Some(""),
+    };
+    media.container(draft, params, &graphics.media, own)
 }
 
 /// The name of a shape's material; black for what gives off light at an interface.
@@ -64,8 +95,8 @@ impl Shapes<'_> {
     pub fn read(
         &self,
         draft: &mut Draft,
-        kind: &str,
-        params: &Params,
+        media: &mut MediumTable,
+        Directive { kind, params }: Directive,
         graphics: &Graphics,
     ) -> Result<Option<ShapeDesc>> {
         let mut light = graphics.area_light.as_deref();
@@ -73,11 +104,15 @@ impl Shapes<'_> {
             draft.ignored(&params.place, &params.element, "AreaLightSource", "instances give off no light, as in pbrt");
             light = None;
         }
-        if light.is_none() && matches!(graphics.material.as_deref(), Some(ShapeMaterial::Interface)) {
+        let container = if light.is_none() { container(draft, media, params, graphics) } else { None };
+        if light.is_none()
+            && container.is_none()
+            && matches!(graphics.material.as_deref(), Some(ShapeMaterial::Interface))
+        {
             params.report(draft);
             return Ok(None);
         }
-        let material = material_name(draft, params, graphics);
+        let material = container.or_else(|| material_name(draft, params, graphics));
         let alpha = self.textures.number(params, &self.colors, "alpha", 1.0)?;
         if light.is_some() && params.has("alpha") {
             params.ignore("alpha", "what gives off light has no holes");
@@ -101,16 +136,7 @@ impl Shapes<'_> {
             }
             Form::File(file) => (ShapeDesc::Mesh(MeshDesc::from_file(file)), DAffine3::IDENTITY, None),
         };
-        let mut ctm = graphics.ctm;
-        if light.is_some() && ctm.is_moving() {
-            draft.approximated(
-                &params.place,
-                &params.element,
-                "transform",
-                "what gives off light stands still where it is at first",
-            );
-            ctm.0[1] = ctm.0[0];
-        }
+        let ctm = still_if_lit(draft, params, graphics.ctm, light.is_some());
         let common = shape.common_mut();
         (*common.transform, *common.motion) = self.world.place(&ctm, inner);
         *common.material = material;
@@ -130,7 +156,9 @@ impl Shapes<'_> {
             uvs: cut_out
                 || light.is_some_and(AreaLight::is_textured)
                 || material.is_some_and(|material| material.is_textured),
-            sides: light.is_some() || material.is_some_and(|material| material.has_inside),
+            sides: light.is_some()
+                || !graphics.media.inside.is_empty()
+                || material.is_some_and(|material| material.has_inside),
             extent: light.is_some_and(AreaLight::needs_extent),
         }
     }

@@ -5,6 +5,7 @@ use std::rc::Rc;
 
 use super::area_light::AreaLight;
 use super::colors::ColorSpace;
+use super::media::MediumInterface;
 use super::params::Param;
 use crate::desc::{KeyframeDesc, TransformDesc, TransformStepDesc};
 use crate::math::{DAffine3, DMat3, DVec3};
@@ -78,6 +79,8 @@ pub struct Graphics {
     pub color_space: ColorSpace,
     /// Parameters of `Attribute`, by the kind of directive.
     pub attributes: Rc<BTreeMap<String, Vec<Param>>>,
+    /// Of shapes, and of the camera.
+    pub media: Rc<MediumInterface>,
 }
 
 impl Default for Graphics {
@@ -90,6 +93,7 @@ impl Default for Graphics {
             area_light: None,
             color_space: ColorSpace::default(),
             attributes: Rc::default(),
+            media: Rc::default(),
         }
     }
 }

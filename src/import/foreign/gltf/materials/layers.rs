@@ -218,6 +218,7 @@ impl Builder<'_, '_> {
             transmission_tint: ColorDesc::Grey(1.0),
             priority: None,
             absorption,
+            medium: None,
             abbe: abbe.map(|abbe| abbe.clamp(1.0, 1000.0)),
         }))
     }

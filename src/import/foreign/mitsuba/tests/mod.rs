@@ -2,6 +2,7 @@
 
 mod lights;
 mod materials;
+mod media;
 mod sensors;
 mod shapes;
 mod syntax;

@@ -2,6 +2,7 @@
 
 mod errors;
 mod materials;
+mod media;
 mod places;
 
 use crate::desc::{ShapeDesc, TransformDesc, TransformStepDesc};

@@ -1,0 +1,182 @@
+//! Participating media: those of shapes, and what is around everything.
+
+use super::Reader;
+use super::element::Element;
+use super::textures::UvOrigin;
+use super::tree::PluginId;
+use crate::desc::{CoefficientDesc, DielectricDesc, MaterialDesc, MediumDesc, PhaseDesc};
+use crate::error::Result;
+
+/// The largest mean cosine of a phase function.
+const MAX_G: f64 = 0.99;
+
+const UNSUPPORTED: &str = "only homogeneous participating media are supported: left out";
+
+const UNSEEN: &str = "the integrator shows no participating media: left out";
+
+/// The media on both sides of a shape.
+pub(super) struct MediumInterface {
+    pub inside: Option<String>,
+    pub outside: Option<String>,
+}
+
+impl<'a> Reader<'a> {
+    /// Whether the scene's integrator shows media.
+    pub(super) fn shows_media(&self) -> bool {
+        let is_volumetric = |kind: &str| matches!(kind, "volpath" | "volpathmis" | "prbvolpath");
+        self.document.plugins.iter().any(|plugin| plugin.class == "integrator" && is_volumetric(&plugin.kind))
+    }
+
+    /// The name of the medium that is a property of an element, if it is shown.
+    pub(super) fn medium(&mut self, element: &mut Element<'a>, name: &str) -> Result<Option<String>> {
+        let Some(property) = element.plugin.properties.iter().find(|property| property.name == name) else {
+            return Ok(None);
+        };
+        let Some(id) = self.document.plugin_of(property)?.filter(|id| self.document.plugins[id.0].class == "medium")
+        else {
+            return Ok(None);
+        };
+        if !self.shows_media() {
+            element.ignored(name, UNSEEN);
+            return Ok(None);
+        }
+        let medium = self.named_medium(id)?;
+        match &medium {
+            Some(_) => drop(element.take(name)),
+            None => element.ignored(name, UNSUPPORTED),
+        }
+        Ok(medium)
+    }
+
+    /// The name of what a medium becomes.
+    fn named_medium(&mut self, id: PluginId) -> Result<Option<String>> {
+        if let Some(name) = self.media.get(&id) {
+            return Ok(name.clone());
+        }
+        if self.document.plugins[id.0].kind != "homogeneous" {
+            self.whole(id, UNSUPPORTED);
+            self.media.insert(id, None);
+            return Ok(None);
+        }
+        let mut element = Element::new(self.document, id);
+        let scale = element.float("scale")?.unwrap_or(1.0) as f32;
+        let albedo = self.coefficient(&mut element, "albedo")?.unwrap_or([0.75; 3]).map(|a| a.clamp(0.0, 1.0));
+        let extinction = self.coefficient(&mut element, "sigma_t")?.unwrap_or([1.0; 3]).map(|t| t * scale);
+        let emission = self.coefficient(&mut element, "emission")?.unwrap_or([0.0; 3]);
+        let has_emission = emission != [0.0; 3];
+        // How lights are sampled does not change the picture.
+        element.boolean("sample_emitters", true)?;
+        let phase = match element.one("phase")? {
+            Some(phase) => self.phase(phase)?,
+            None => PhaseDesc::Isotropic,
+        };
+        let of = |f: &dyn Fn(usize) -> f32| CoefficientDesc::Rgb([0, 1, 2].map(f));
+        let desc = MediumDesc {
+            absorption: of(&|i| extinction[i] * (1.0 - albedo[i])),
+            scattering: of(&|i| extinction[i] * albedo[i]),
+            emission: if has_emission { of(&|i| emission[i] * scale) } else { CoefficientDesc::default() },
+            phase,
+        };
+        let name = if element.plugin.id.is_empty() { "medium" } else { &element.plugin.id };
+        let name = self.draft.add_medium(name, &element.place().to_string(), desc);
+        element.finish(&mut self.draft);
+        self.media.insert(id, Some(name.clone()));
+        Ok(Some(name))
+    }
+
+    /// A number, colour, spectrum or constant volume.
+    fn coefficient(&mut self, element: &mut Element<'a>, name: &str) -> Result<Option<[f32; 3]>> {
+        let Some(property) = element.plugin.properties.iter().find(|property| property.name == name) else {
+            return Ok(None);
+        };
+        let volume = self.document.plugin_of(property)?.filter(|id| self.document.plugins[id.0].class == "volume");
+        let Some(id) = volume else { return self.constant(element, name, UvOrigin::Mitsuba) };
+        if self.document.plugins[id.0].kind != "constvolume" {
+            element.ignored(name, "a homogeneous medium is the same everywhere");
+            return Ok(None);
+        }
+        let mut volume = Element::new(self.document, id);
+        let value = self.constant(&mut volume, "value", UvOrigin::Mitsuba)?;
+        volume.finish(&mut self.draft);
+        element.take(name);
+        Ok(value)
+    }
+
+    fn phase(&mut self, id: PluginId) -> Result<PhaseDesc> {
+        let mut element = Element::new(self.document, id);
+        let phase = match element.kind() {
+            "isotropic" => PhaseDesc::Isotropic,
+            "rayleigh" => PhaseDesc::Rayleigh,
+            "hg" => {
+                let g = element.float("g")?.unwrap_or(0.8);
+                if g.abs() > MAX_G {
+                    element.approximated("g", format!("at most {MAX_G}"));
+                }
+                PhaseDesc::HenyeyGreenstein { g: g.clamp(-MAX_G, MAX_G) as f32 }
+            }
+            _ => {
+                element.ignored("", "unsupported phase function: an isotropic one in its place");
+                PhaseDesc::Isotropic
+            }
+        };
+        element.finish(&mut self.draft);
+        Ok(phase)
+    }
+
+    /// The material of a surface between media, whose BSDF has become `material`; `None` where media change nothing.
+    pub(super) fn container(
+        &mut self,
+        bsdf: Option<PluginId>,
+        material: &str,
+        interface: &MediumInterface,
+    ) -> Option<String> {
+        let MediumInterface { inside, outside } = interface;
+        let is_null = bsdf.is_some_and(|id| self.document.plugins[id.0].kind == "null");
+        let desc = match self.draft.desc.materials.get(material) {
+            _ if inside.is_none() && outside.is_none() => return None,
+            _ if is_null => DielectricDesc::invisible(),
+            Some(MaterialDesc::Dielectric(glass)) => (**glass).clone(),
+            _ => return None,
+        };
+        let key = (material.to_owned(), inside.clone(), outside.is_some());
+        if let Some(name) = self.containers.get(&key) {
+            return Some(name.clone());
+        }
+        // What lies in another medium displaces it.
+        let priority = Some(i32::from(outside.is_some()));
+        let desc = MaterialDesc::Dielectric(Box::new(DielectricDesc { priority, medium: inside.clone(), ..desc }));
+        let name = format!("{}_surface", inside.as_deref().unwrap_or(material));
+        let name = self.draft.add_material(&name, "", desc);
+        self.containers.insert(key, name.clone());
+        Some(name)
+    }
+
+    /// The media inside and outside of a shape.
+    pub(super) fn medium_interface(&mut self, element: &mut Element<'a>) -> Result<MediumInterface> {
+        let inside = self.medium(element, "interior")?;
+        let outside = self.medium(element, "exterior")?;
+        self.media_outside.extend(outside.clone());
+        element.ignored_other_plugins("medium", "media have the names \"interior\" and \"exterior\"")?;
+        Ok(MediumInterface { inside, outside })
+    }
+
+    /// Notes the medium around the camera or a light, whatever its name.
+    pub(super) fn medium_outside(&mut self, element: &mut Element<'a>) -> Result<()> {
+        for property in &element.plugin.properties {
+            let medium = self.medium(element, &property.name)?;
+            self.media_outside.extend(medium);
+        }
+        Ok(())
+    }
+
+    /// What is outside of some shape and inside of none is around everything.
+    pub(super) fn surround(&mut self) {
+        let mut around = self.media_outside.difference(&self.media_inside).cloned();
+        let first = around.next();
+        if let (Some(first), Some(second)) = (&first, around.next()) {
+            let why = format!("only one medium can be around everything: {first}, not {second}");
+            self.draft.ignored("", "scene", "", why);
+        }
+        self.draft.desc.medium = first;
+    }
+}

@@ -1,0 +1,156 @@
+//! Participating media.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::colors::{Colors, Meaning};
+use super::directives::quoted;
+use super::params::Params;
+use super::tokens::{Lexer, Position, TokenKind};
+use crate::desc::{CoefficientDesc, DielectricDesc, MaterialDesc, MediumDesc, PhaseDesc};
+use crate::error::Result;
+use crate::import::foreign::Draft;
+
+/// The largest mean cosine of a phase function.
+const MAX_G: f64 = 0.99;
+
+/// The media inside and outside of shapes, by pbrt's names; empty for none.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MediumInterface {
+    /// Behind the normal.
+    pub inside: String,
+    /// On the side of the normal.
+    pub outside: String,
+}
+
+impl MediumInterface {
+    /// Reads what follows `MediumInterface`: one name for both sides, or two.
+    pub fn read(lexer: &mut Lexer, at: Position) -> Result<Self> {
+        let inside = quoted(lexer, at, "a medium")?;
+        let has_two = lexer.peek()?.is_some_and(|token| token.kind == TokenKind::Quoted);
+        let outside = if has_two { quoted(lexer, at, "a medium")? } else { inside.clone() };
+        Ok(Self { inside, outside })
+    }
+}
+
+/// The media of a scene.
+#[derive(Debug, Default)]
+pub struct MediumTable {
+    /// Names in the scene by pbrt's; `None` of media that are left out.
+    names: BTreeMap<String, Option<String>>,
+    /// Materials of surfaces of media, by those of the surface (empty for none), the names of the media inside, and
+    /// whether another is outside.
+    containers: BTreeMap<(String, Option<String>, bool), String>,
+    inside: BTreeSet<String>,
+    outside: BTreeSet<String>,
+    /// Whether the integrator shows none.
+    pub are_hidden: bool,
+}
+
+impl MediumTable {
+    /// Reads a medium.
+    pub fn define(&mut self, draft: &mut Draft, name: &str, params: &Params, colors: &Colors) -> Result<()> {
+        let kind = params.string("type")?.unwrap_or("homogeneous");
+        if kind != "homogeneous" {
+            let why = "only homogeneous media are supported: left out";
+            draft.ignored(&params.place, &params.element, "", why);
+            self.names.insert(name.into(), None);
+            return Ok(());
+        }
+        let scale = params.number_or("scale", 1.0)? as f32;
+        let coefficient = |name: &str| -> Result<[f32; 3]> {
+            Ok(colors.get(params, name, Meaning::Number)?.unwrap_or([1.0; 3]).map(|c| c.max(0.0) * scale))
+        };
+        let (absorption, scattering) = (coefficient("sigma_a")?, coefficient("sigma_s")?);
+        params.ignore("preset", "measured media are not known: the coefficients of the file or 1");
+        let brightness = params.number_or("Lescale", 1.0)? as f32;
+        let radiance = colors.get(params, "Le", Meaning::Emission)?.unwrap_or([0.0; 3]);
+        let emission = [0, 1, 2].map(|i| radiance[i].max(0.0) * brightness * absorption[i]);
+        let g = params.number_or("g", 0.0)?;
+        if g.abs() > MAX_G {
+            params.approximate("g", format!("at most {MAX_G}"));
+        }
+        let phase = if g == 0.0 {
+            PhaseDesc::Isotropic
+        } else {
+            PhaseDesc::HenyeyGreenstein { g: g.clamp(-MAX_G, MAX_G) as f32 }
+        };
+        let [absorption, scattering, emission] = [absorption, scattering, emission].map(CoefficientDesc::Rgb);
+        let emission = if emission == CoefficientDesc::Rgb([0.0; 3]) { CoefficientDesc::default() } else { emission };
+        let desc = MediumDesc { absorption, scattering, emission, phase };
+        params.report(draft);
+        let added = draft.add_medium(name, &params.place, desc);
+        self.names.insert(name.into(), Some(added));
+        Ok(())
+    }
+
+    fn find(&self, draft: &mut Draft, params: &Params, name: &str) -> Option<String> {
+        if name.is_empty() {
+            return None;
+        }
+        let known = self.names.get(name).cloned();
+        if known.is_none() {
+            let why = format!("no medium named \"{name}\"");
+            draft.ignored(&params.place, &params.element, "MediumInterface", why);
+        }
+        known.flatten().filter(|_| !self.are_hidden)
+    }
+
+    /// Notes a medium around something that is no surface.
+    pub fn surround(&mut self, draft: &mut Draft, params: &Params, name: &str) {
+        let found = self.find(draft, params, name);
+        self.outside.extend(found);
+    }
+
+    /// The material of a shape between media, whose own is `material` or nothing; `None` where the media change
+    /// nothing.
+    pub fn container(
+        &mut self,
+        draft: &mut Draft,
+        params: &Params,
+        interface: &MediumInterface,
+        material: Option<&str>,
+    ) -> Option<String> {
+        if interface.inside == interface.outside {
+            self.surround(draft, params, &interface.outside);
+            return None;
+        }
+        let inside = self.find(draft, params, &interface.inside);
+        let outside = self.find(draft, params, &interface.outside);
+        self.outside.extend(outside.clone());
+        let desc = match material.map(|name| draft.desc.materials.get(name)) {
+            _ if inside.is_none() && outside.is_none() => return None,
+            None => DielectricDesc::invisible(),
+            Some(Some(MaterialDesc::Dielectric(glass))) => (**glass).clone(),
+            Some(_) => return None,
+        };
+        self.inside.extend(inside.clone());
+        let key = (material.unwrap_or_default().to_owned(), inside.clone(), outside.is_some());
+        if let Some(name) = self.containers.get(&key) {
+            return Some(name.clone());
+        }
+        let name = format!("{}_surface", inside.as_deref().or(material).unwrap_or("interface"));
+        // What lies in another medium displaces it.
+        let priority = Some(i32::from(outside.is_some()));
+        let desc = MaterialDesc::Dielectric(Box::new(DielectricDesc { priority, medium: inside, ..desc }));
+        let name = draft.add_material(&name, &params.place, desc);
+        self.containers.insert(key, name.clone());
+        Some(name)
+    }
+
+    /// What is outside of some shape, or around the camera, and inside of none is around everything.
+    pub fn finish(&self, draft: &mut Draft) {
+        if self.are_hidden {
+            if !self.names.is_empty() {
+                draft.ignored("", "MakeNamedMedium", "", "the integrator shows no participating media");
+            }
+            return;
+        }
+        let mut around = self.outside.difference(&self.inside).cloned();
+        let first = around.next();
+        if let (Some(first), Some(second)) = (&first, around.next()) {
+            let why = format!("only one medium can be around everything: {first}, not {second}");
+            draft.ignored("", "MediumInterface", "", why);
+        }
+        draft.desc.medium = first;
+    }
+}
