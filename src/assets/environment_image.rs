@@ -40,7 +40,7 @@ pub fn read_rgb_image(path: &Path) -> Result<RgbImage, AssetError> {
 fn read_exr(path: &Path) -> Result<RgbImage, AssetError> {
     let malformed = |e: &dyn std::fmt::Display| AssetError::Malformed(format!("not a readable EXR file: {e}"));
     let source = crate::file::open(path).map_err(|e| AssetError::missing(path, &e))?;
-    let headers = read_headers(path).map_err(|e| malformed(&e))?;
+    let headers = read_headers(path).map_err(AssetError::Malformed)?;
     let choose = |(part, header): (usize, &Header)| {
         let [r, g, b] =
             ["R", "G", "B"].map(|name| header.channels.list.iter().position(|channel| channel.name == *name));

@@ -50,7 +50,7 @@ fn main() -> ExitCode {
     match config::parse().and_then(start) {
         Ok(code) => ExitCode::from(code),
         Err(error) => {
-            log::message(Level::Error, &chain(&error));
+            error.parts().iter().for_each(|error| log::message(Level::Error, &chain(error)));
             ExitCode::from(exit_code(error.kind()))
         }
     }

@@ -25,6 +25,7 @@ use crate::progress::Reporter;
 use crate::rerender;
 use crate::skipped::Skipped;
 use crate::stats::{self, Run};
+use crate::text::counted;
 use crate::{files, text};
 
 /// Renders a picture and writes its outputs; the result is the exit code. `start` is when the scene's reading began.
@@ -300,14 +301,14 @@ fn report(reporter: &Reporter, settings: &Settings, accel: &dyn Accelerator, sta
         _ => "",
     };
     reporter.say(&format!(
-        "{}x{} pixels, {} samples per pixel{ended}, {:.2} s, {:.2} Msamples/s, {:.2} Mrays/s, {} threads, {}",
+        "{}x{} pixels, {} per pixel{ended}, {:.2} s, {:.2} Msamples/s, {:.2} Mrays/s, {}, {}",
         settings.crop.width,
         settings.crop.height,
-        stats.spp_done,
+        counted(u64::from(stats.spp_done), "sample"),
         stats.render_seconds,
         stats.samples as f64 / seconds * 1e-6,
         stats.rays.total() as f64 / seconds * 1e-6,
-        settings.threads,
+        counted(settings.threads as u64, "thread"),
         accel.description(),
     ));
     if let (Some(error), Some(target)) = (stats.estimated_error, settings.target_error) {

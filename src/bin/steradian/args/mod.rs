@@ -18,7 +18,7 @@ mod state;
 
 use std::path::PathBuf;
 
-use clap::{ArgAction, Args, Parser, Subcommand};
+use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use steradian::accel::AccelKind;
 use steradian::desc::{CausticsDesc, IntegratorDesc, SamplerKindDesc, StrategyDesc, ViewDesc};
@@ -80,6 +80,60 @@ Examples:
 Without -o and without \"outputs\" in the scene, SCENE.exr and SCENE.png are written to the working directory.
 Ctrl-C finishes the samples under way and writes the picture; a second one leaves at once.";
 
+const RENDER_SHORT_EXAMPLES: &str = "\
+Examples:
+  steradian render cornell.json -s 1024 -o cornell.exr -o cornell.png
+  steradian render cornell.json --time-limit 60 --size 1920x1080 --denoise
+
+These are the common options; `steradian render --help` explains all of them.";
+
+/// What the program prints without arguments.
+pub const FIRST_STEPS: &str = "\
+Steradian, a physically based path tracer for the CPU
+
+First steps:
+  steradian render scene.json -o picture.exr -o picture.png    Render a scene (.json, .xml, .pbrt, .gltf or .glb)
+  steradian info scene.json                                    Check a scene: size, camera, contents, cost
+  steradian convert scene.xml scene.json                       Turn a Mitsuba, pbrt or glTF scene into JSON
+  steradian schema > scene.schema.json                         The scene format, for editors
+
+`steradian render -h` lists the common options, `steradian --help` all commands.";
+
+/// Options of `render` that `-h` shows; `--help` shows all.
+const COMMON_OPTIONS: [&str; 21] = [
+    "scene",
+    "output",
+    "spp",
+    "target_error",
+    "size",
+    "crop",
+    "layers",
+    "exposure",
+    "denoise",
+    "integrator",
+    "max_depth",
+    "seed",
+    "accel",
+    "threads",
+    "time_limit",
+    "json",
+    "checkpoint",
+    "resume",
+    "preview",
+    "frames",
+    "overwrite",
+];
+
+/// The command line as it is parsed: the options that few need are absent from `-h`.
+pub fn command_line() -> clap::Command {
+    Cli::command().mut_subcommand("render", |render| {
+        render.mut_args(|arg| {
+            let is_common = ["quiet", "verbose", "help"].iter().chain(&COMMON_OPTIONS).any(|id| arg.get_id() == *id);
+            arg.hide_short_help(!is_common)
+        })
+    })
+}
+
 /// A fast, accurate CPU renderer.
 #[derive(Debug, Parser)]
 #[command(name = "steradian", version, about, after_help = EXAMPLES, max_term_width = 120)]
@@ -95,12 +149,13 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Render a scene to files
-    #[command(after_help = RENDER_EXAMPLES)]
+    #[command(after_help = RENDER_SHORT_EXAMPLES, after_long_help = RENDER_EXAMPLES)]
     Render(Box<RenderArgs>),
-    /// Print what is in a scene
+    /// Check a scene and print what is in it and what it will cost
     ///
-    /// Loads the scene with everything it names and prints counts, bounds, memory and features. A scene that has info
-    /// without an error renders without an error.
+    /// Loads the scene with everything it names and prints size, samples, camera, bounds, counts, features, the number
+    /// of camera rays and the memory of geometry and film. A scene that has info without an error renders without an
+    /// error.
     Info(InfoArgs),
     /// Turn a scene of another renderer into the JSON format, with its meshes and images beside it
     #[command(after_help = import::CONVERT_EXAMPLES)]
@@ -183,7 +238,7 @@ pub struct RenderArgs {
     pub output: Vec<String>,
 
     /// Samples per pixel
-    #[arg(long, value_name = "N", help_heading = "Picture")]
+    #[arg(short = 's', long, value_name = "N", help_heading = "Picture")]
     pub spp: Option<u32>,
     /// Render until the picture's relative squared error is below this, with samples where they are needed
     ///
@@ -226,7 +281,7 @@ pub struct RenderArgs {
     /// Largest number of segments from the camera; 1 shows only directly visible light
     #[arg(long, value_name = "N", help_heading = "Algorithm")]
     pub max_depth: Option<u32>,
-    /// How directions towards lights are found
+    /// Light sampling: by lights, by materials, or both weighted by multiple importance sampling
     #[arg(long, value_name = "NAME", value_parser = names::plain::<StrategyDesc>(), help_heading = "Algorithm")]
     pub strategy: Option<StrategyDesc>,
     /// Clamp the contribution of a single path of indirect light: less noise, but biased (too dark). Off by default;
@@ -271,12 +326,12 @@ pub struct RenderArgs {
     /// Do not show the background to the camera: alpha is 0 there
     #[arg(long, help_heading = "Picture")]
     pub transparent: bool,
-    /// What finds hits: embree, bvh, kdtree, octree or linear, with options such as embree:high
+    /// Ray accelerator: auto, embree, packets, bvh, kdtree, octree or linear, with options such as embree:high
     #[arg(long, value_name = "NAME", long_help = accel_help(), help_heading = "Algorithm")]
     pub accel: Option<AccelKind>,
 
     /// Number of threads; 0 means all. The picture does not depend on it
-    #[arg(long, value_name = "N", help_heading = "Run")]
+    #[arg(short = 't', long, value_name = "N", help_heading = "Run")]
     pub threads: Option<usize>,
     /// End after this time even if samples are missing
     #[arg(long, value_name = "SECONDS", help_heading = "Run")]
@@ -430,7 +485,7 @@ fn accel_help() -> String {
     let line = |(name, what): &(&str, &str)| format!("  {name:<16}{what}");
     let lines: Vec<_> = AccelKind::CHOICES.iter().map(line).collect();
     format!(
-        "What finds hits; all give the same picture within rounding. Options combine, as in embree:low+compact\n\n{}",
+        "Ray accelerator; all give the same picture within rounding. Options combine, as in embree:low+compact\n\n{}",
         lines.join("\n")
     )
 }

@@ -2,6 +2,7 @@
 //! the machine's limits.
 
 mod files;
+mod hints;
 mod show;
 
 use std::ffi::OsString;
@@ -14,7 +15,7 @@ use steradian::farm::message_lines;
 use steradian::suggestion::did_you_mean;
 use steradian::{Error, Result};
 
-use crate::args::Cli;
+use crate::args::{Cli, FIRST_STEPS, command_line};
 use crate::log;
 pub use show::run as show;
 
@@ -67,7 +68,11 @@ pub struct Parsed {
 pub fn parse() -> Result<Parsed> {
     let line: Vec<OsString> = std::env::args_os().collect();
     check_utf8(&line)?;
-    let command = color(Cli::command(), &line);
+    if line.len() == 1 {
+        log::line(FIRST_STEPS);
+        std::process::exit(2);
+    }
+    let command = color(command_line(), &line);
     let matches = command.clone().try_get_matches_from(&line).unwrap_or_else(|error| exit(&error));
     let Some(("render", render)) = matches.subcommand() else {
         return Ok(Parsed { cli: typed(&matches), warnings: Vec::new(), added: Vec::new(), files: Vec::new() });
@@ -93,10 +98,18 @@ pub fn parse() -> Result<Parsed> {
 fn exit(error: &clap::Error) -> ! {
     let text = error.to_string();
     let harmless = message_lines(&text);
-    if !error.use_stderr() || harmless == text {
+    if !error.use_stderr() {
         error.exit();
     }
-    log::line(harmless.trim_end());
+    if harmless == text {
+        // Stderr may be gone; that is no reason to stop.
+        let _ = error.print();
+    } else {
+        log::line(harmless.trim_end());
+    }
+    if let Some(hint) = hints::hint(error) {
+        log::line(&message_lines(&format!("\n{hint}")));
+    }
     std::process::exit(error.exit_code());
 }
 
