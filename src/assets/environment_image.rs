@@ -47,7 +47,7 @@ fn read_exr(path: &Path) -> Result<RgbImage, AssetError> {
         Some([r?, g?, b?].map(|channel| Place { part, channel }))
     };
     let flat = headers.iter().enumerate().filter(|(_, header)| !header.deep);
-    let requested = flat.filter_map(choose).next().ok_or_else(|| malformed(&"there are no channels R, G and B"))?;
+    let requested = flat.filter_map(choose).next().ok_or_else(|| malformed(&"no channels R, G and B"))?;
     let header = &headers[requested[0].part];
     // The size is checked first: memory is allocated before any pixel is read.
     let mut pixels = vec![[0.0; 3]; pixel_count(header).map_err(|e| malformed(&e))?];

@@ -156,7 +156,7 @@ impl CompileContext {
     /// Warns of a file that is not there and that nothing uses.
     fn warn_of_missing(&self, path: &str, name: &str) {
         if !self.source.assets.contains(name) && !self.source.asset(name).is_file() {
-            self.warn(path, format_args!("there is no file {name}; nothing uses it"));
+            self.warn(path, format_args!("no file {name}; nothing uses it"));
         }
     }
 

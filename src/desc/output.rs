@@ -193,7 +193,7 @@ impl ViewDesc {
     }
 }
 
-/// Whom an EXR file is made for.
+/// The application that an EXR file is made for: channel names, parts and compression.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ExrProfileDesc {

@@ -53,10 +53,10 @@ pub fn blank_comments(text: &str) -> Blanked {
             }
             _ => {}
         }
-        if matches!(state, State::Code | State::Text)
-            && let Some(comma) = commas.next(out.len(), byte)
-        {
-            out[comma] = b' ';
+        match state {
+            State::Code => commas.next(out.len(), byte).into_iter().for_each(|comma| out[comma] = b' '),
+            State::Text => commas = LastComma { at: None, last: b'"' },
+            State::Line | State::Block => {}
         }
         let blank = matches!(state, State::Line | State::Block) && byte != b'\n';
         out.push(if blank { b' ' } else { byte });

@@ -173,7 +173,7 @@ fn tasks(arguments: &DenoiseArgs) -> Result<Vec<Task>> {
     }
     let frames = pattern.frames()?;
     if frames.is_empty() {
-        return Err(Error::Missing { file: input.clone(), message: "there is no frame of this sequence".to_owned() });
+        return Err(Error::Missing { file: input.clone(), message: "no frame of this sequence".to_owned() });
     }
     let fill =
         |path: &Path, frame: u64| Pattern::new(path).map_or_else(|| path.to_owned(), |pattern| pattern.file(frame));

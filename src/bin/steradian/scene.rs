@@ -99,7 +99,7 @@ mod tests {
         assert!(lines(Path::new("s.json"), &Draft::default().finish(), true).is_empty());
         draft.mapped("s.xml:1:1", "film", "width");
         for i in 0..20 {
-            draft.ignored("s.xml:2:1", "film", &format!("p{i}"), "there is no such thing");
+            draft.ignored("s.xml:2:1", "film", &format!("p{i}"), "no such thing");
         }
         let imported = draft.finish();
         let short = lines(Path::new("s.xml"), &imported, false);

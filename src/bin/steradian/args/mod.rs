@@ -173,7 +173,7 @@ pub enum Command {
     Merge(MergeArgs),
     /// Check EXR files against what the programs that read them expect
     ///
-    /// Names every rule that a file breaks, what reads it wrongly, and how to mend it. docs/exr.md lists the rules.
+    /// Names every rule that a file breaks, what reads it wrongly, and how to fix it. docs/exr.md lists the rules.
     #[command(after_help = exr::CHECK_EXAMPLES)]
     CheckExr(CheckExrArgs),
     /// Render the picture of an EXR file again
@@ -195,7 +195,7 @@ pub enum Command {
     /// Denoise an EXR file with Intel Open Image Denoise
     #[command(long_about = denoise::ABOUT, after_help = denoise::EXAMPLES)]
     Denoise(DenoiseArgs),
-    /// Measure
+    /// Measure speed, error, scaling and numerical stability
     #[cfg(feature = "bench")]
     #[command(subcommand)]
     Bench(BenchCommand),
@@ -314,10 +314,10 @@ pub struct RenderArgs {
     /// alike the light is.
     #[arg(long, value_name = "FILE", help_heading = "Algorithm")]
     pub guide: Option<PathBuf>,
-    /// How samples are chosen
+    /// Sampler: how samples are chosen
     #[arg(long, value_name = "NAME", value_parser = names::plain::<SamplerKindDesc>(), help_heading = "Algorithm")]
     pub sampler: Option<SamplerKindDesc>,
-    /// A different seed gives different noise
+    /// Seed of the noise
     #[arg(long, value_name = "N", help_heading = "Algorithm")]
     pub seed: Option<u64>,
     /// Render everything in focus, as if the camera had no lens
@@ -333,7 +333,7 @@ pub struct RenderArgs {
     /// Number of threads; 0 means all. The picture does not depend on it
     #[arg(short = 't', long, value_name = "N", help_heading = "Run")]
     pub threads: Option<usize>,
-    /// End after this time even if samples are missing
+    /// Stop after this time, with the samples so far
     #[arg(long, value_name = "SECONDS", help_heading = "Run")]
     pub time_limit: Option<f64>,
     /// Write statistics as JSON to this file; - for stdout

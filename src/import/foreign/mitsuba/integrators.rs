@@ -50,7 +50,7 @@ impl Reader<'_> {
             "volpath" | "volpathmis" | "prbvolpath" => {
                 self.draft.desc.integrator = path(&mut element)?;
                 if self.document.plugins.iter().any(|plugin| plugin.class == "medium") {
-                    element.approximated("", "path tracing: there are no participating media");
+                    element.approximated("", "path tracing: participating media are unsupported");
                 }
             }
             "ptracer" => {
