@@ -246,3 +246,34 @@ fn one_sample_is_no_plural() {
     let stderr = stderr_of(&run(folder.path(), "render scene.json -s 1 -t 1 -o a.exr"));
     assert!(stderr.contains("1 sample per pixel,") && stderr.contains(", 1 thread,"), "{stderr}");
 }
+
+#[test]
+fn keys_of_the_scene_are_set_and_rerendered() {
+    let folder = tempfile::tempdir().unwrap();
+    let render = |arguments: &str| {
+        let output = run(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(0), "{arguments}: {}", stderr_of(&output));
+        let name = arguments.split_whitespace().last().unwrap();
+        output::read_exr(&folder.path().join(name)).unwrap()
+    };
+    let options = render("render scene.json -q --spp 3 --max-depth 2 --size 20x10 -o options.exr");
+    let set = "--set sampler.spp=3 --set integrator.max_depth=2 --set film.width=20 --set film.height=10";
+    let keys = render(&format!("render scene.json -q {set} -o keys.exr"));
+    let again = render("rerender keys.exr -q -o again.exr");
+    assert_eq!(keys.size, [20, 10]);
+    assert!(keys.layers == options.layers && again.layers == keys.layers);
+    let output = run(folder.path(), "render scene.json --set integrator.depth=3");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr_of(&output).contains("did you mean \"max_depth\"?"), "{}", stderr_of(&output));
+}
+
+#[test]
+fn one_sample_is_replayed_by_a_command_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let [command, options] = ["replay scene.json 3,4 1 --seed 5", "render scene.json --seed 5 --pixel 3,4 --sample 1"]
+        .map(|arguments| run(folder.path(), arguments));
+    assert!(command.status.success() && command.stdout.starts_with(b"radiance "), "{}", stderr_of(&command));
+    assert_eq!(command.stdout, options.stdout);
+    let output = run(folder.path(), "replay scene.json");
+    assert_eq!(output.status.code(), Some(2));
+}

@@ -38,6 +38,8 @@ impl<'a> NamedFiles<'a> {
                 self.written.extend(named.into_iter().filter_map(|(path, option)| Some((path.clone()?, option))));
                 self.import = Some(&arguments.import);
             }
+            // The command line has no other form of it that is valid.
+            Command::Replay(_) => {}
             Command::Rerender(arguments) => {
                 self.read.push((&arguments.file, "the picture to render again"));
                 self.read.extend(arguments.scene.iter().map(|path| (path.as_path(), SCENE)));

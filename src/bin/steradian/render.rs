@@ -23,6 +23,7 @@ use crate::frames::{Session, Shot};
 use crate::kept::{self, Resumable};
 use crate::progress::Reporter;
 use crate::rerender;
+use crate::set;
 use crate::skipped::Skipped;
 use crate::stats::{self, Run};
 use crate::text::counted;
@@ -109,7 +110,12 @@ impl<'a> Plan<'a> {
             }
             None => {
                 overrides.guide = arguments.guide.as_deref().map(TrainedGuide::read).transpose()?;
-                Settings::new(&shot.imported.desc, &overrides)?
+                let desc = &shot.imported.desc;
+                if arguments.set.is_empty() {
+                    Settings::new(desc, &overrides)?
+                } else {
+                    Settings::new(&set::changed(desc, &arguments.set)?, &overrides)?
+                }
             }
         };
         if arguments.pixel.is_none() {
@@ -288,7 +294,7 @@ fn warn_of_dropped(stats: &Stats, reporter: &Reporter) {
     let Some(first) = stats.dropped.first() else { return };
     let (count, noun) = (stats.nan_samples, if stats.nan_samples == 1 { "sample was" } else { "samples were" });
     reporter.warn(&format!(
-        "{count} {noun} not finite and dropped (this is a bug; --pixel {},{} --sample {} replays the first)",
+        "{count} {noun} not finite and dropped (this is a bug; `steradian replay SCENE {},{} {}` replays the first)",
         first.x, first.y, first.sample
     ));
 }

@@ -15,6 +15,7 @@ mod import;
 mod live;
 mod log;
 mod state;
+mod texts;
 
 use std::path::PathBuf;
 
@@ -26,6 +27,7 @@ use steradian::render::Overrides;
 
 use crate::names::{self, Layers};
 use crate::rerender::Repeat;
+use crate::set::Assignment;
 #[cfg(feature = "bench")]
 pub use bench::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityArgs};
 #[cfg(feature = "bench")]
@@ -41,63 +43,8 @@ pub use import::{ConvertArgs, ImportArgs};
 pub use log::{ColorChoice, LogArgs, LogFormat};
 use state::MERGE_EXAMPLES;
 pub use state::{MergeArgs, StateArgs};
-
-const EXAMPLES: &str = "\
-Examples:
-  steradian render scene.json                      Writes what the scene's \"outputs\" name
-  steradian render scene.json -o a.exr -o a.png    Writes these instead
-  steradian render scene.xml                       A Mitsuba 3 scene; .pbrt, .gltf and .glb files are read as well
-  steradian convert scene.xml scene.json           The same as a JSON scene, to be edited
-  steradian info scene.json                        What is in the scene
-  steradian compare reference.exr test.exr         How far two pictures differ
-
-Exit codes: 0 done, 1 internal failure, 2 wrong usage, 3 scene invalid, 4 file missing, 5 output not writable, 6 \
-checkpoint or
-shard does not match, 33 out of memory, 130 interrupted and 143 terminated (with checkpoint and picture so far \
-written).";
-
-const RENDER_EXAMPLES: &str = "\
-Examples:
-  steradian render cornell.json --spp 1024 -o cornell.exr
-      1024 samples per pixel into a linear multi-layer EXR.
-  steradian render cornell.json --time-limit 60 --size 1920x1080 -o a.exr -o a.png
-      The best picture a minute can give, as EXR and as PNG.
-  steradian render cornell.json --crop 200,100,64,64 --spp 4096
-      A close look at one part; each pixel is the same as in the whole picture.
-  steradian render cornell.json --integrator ambient_occlusion --spp 16
-      The geometry without materials and lights.
-  steradian render cornell.json --layers Z,N,albedo --float -o cornell.exr
-      Depth, normals and albedo beside the picture, everything in 32 bits.
-  steradian render cornell.json --spp 4096 --checkpoint cornell.state --resume
-      Whatever ends the render, the same line continues it; a larger --spp adds samples.
-  steradian render cornell.json --shard 2/8
-      An eighth of the samples into cornell.2-of-8.shard, for steradian merge.
-  steradian render cornell.json --pixel 120,80 --sample 7
-      The values of exactly one sample; nothing is written.
-  steradian render cornell.json -q --json - | jq .mrays_per_second
-      Statistics for scripts.
-
-Without -o and without \"outputs\" in the scene, SCENE.exr and SCENE.png are written to the working directory.
-Ctrl-C finishes the samples under way and writes the picture; a second one leaves at once.";
-
-const RENDER_SHORT_EXAMPLES: &str = "\
-Examples:
-  steradian render cornell.json -s 1024 -o cornell.exr -o cornell.png
-  steradian render cornell.json --time-limit 60 --size 1920x1080 --denoise
-
-These are the common options; `steradian render --help` explains all of them.";
-
-/// What the program prints without arguments.
-pub const FIRST_STEPS: &str = "\
-Steradian, a physically based path tracer for the CPU
-
-First steps:
-  steradian render scene.json -o picture.exr -o picture.png    Render a scene (.json, .xml, .pbrt, .gltf or .glb)
-  steradian info scene.json                                    Check a scene: size, camera, contents, cost
-  steradian convert scene.xml scene.json                       Turn a Mitsuba, pbrt or glTF scene into JSON
-  steradian schema > scene.schema.json                         The scene format, for editors
-
-`steradian render -h` lists the common options, `steradian --help` all commands.";
+pub use texts::FIRST_STEPS;
+use texts::{EXAMPLES, RENDER_EXAMPLES, RENDER_SHORT_EXAMPLES};
 
 /// Options of `render` that `-h` shows; `--help` shows all.
 const COMMON_OPTIONS: [&str; 21] = [
@@ -182,6 +129,11 @@ pub enum Command {
     /// changed is an error that names it. No other path or address in the file is loaded, written or connected to.
     #[command(after_help = exr::RERENDER_EXAMPLES)]
     Rerender(RerenderArgs),
+    /// Print the values of one sample of one pixel
+    ///
+    /// The sample is computed as the render with the same options computes it, bit for bit; nothing is written.
+    #[command(after_help = "Example:\n  steradian replay cornell.json 120,80 7 --integrator whitted")]
+    Replay(ReplayArgs),
     /// Compare a picture with its reference
     ///
     /// Both are EXR files; the linear colour is compared. mse is the mean of (test - reference)², relmse that of
@@ -314,6 +266,12 @@ pub struct RenderArgs {
     /// alike the light is.
     #[arg(long, value_name = "FILE", help_heading = "Algorithm")]
     pub guide: Option<PathBuf>,
+    /// Set a key of the scene's film, sampler or integrator, such as integrator.clamp=10; repeat for several
+    ///
+    /// Keys and values are those of the scene format (`steradian schema`). The picture's EXR file holds them, for
+    /// `steradian rerender`. Options of their own, such as --spp, take precedence.
+    #[arg(long, value_name = "KEY=VALUE", help_heading = "Algorithm")]
+    pub set: Vec<Assignment>,
     /// Sampler: how samples are chosen
     #[arg(long, value_name = "NAME", value_parser = names::plain::<SamplerKindDesc>(), help_heading = "Algorithm")]
     pub sampler: Option<SamplerKindDesc>,
@@ -340,10 +298,10 @@ pub struct RenderArgs {
     #[arg(long, value_name = "STATS", help_heading = "Run")]
     pub json: Option<PathBuf>,
     /// Replay samples of this pixel alone and print their values; nothing is written
-    #[arg(long, value_name = "X,Y", value_parser = parse_list::<u32, 2>, requires = "sample", help_heading = "Run")]
+    #[arg(long, value_name = "X,Y", value_parser = parse_list::<u32, 2>, requires = "sample", hide = true)]
     pub pixel: Option<[u32; 2]>,
     /// The sample to replay, counted from 0
-    #[arg(long, value_name = "I", requires = "pixel", help_heading = "Run")]
+    #[arg(long, value_name = "I", requires = "pixel", hide = true)]
     pub sample: Option<u32>,
     #[command(flatten)]
     pub exr: ExrArgs,
@@ -387,6 +345,22 @@ pub struct InfoArgs {
     pub import: ImportArgs,
     #[command(flatten)]
     pub verbosity: Verbosity,
+}
+
+/// Arguments of `replay`, which is `render` with `--pixel` and `--sample`.
+#[derive(Debug, Args)]
+pub struct ReplayArgs {
+    /// The scene file
+    pub scene: PathBuf,
+    /// The pixel, from the upper left corner
+    #[arg(value_name = "X,Y")]
+    pub pixel: String,
+    /// The sample, counted from 0
+    #[arg(value_name = "I")]
+    pub sample: u32,
+    /// Options of the render, as of `steradian render`
+    #[arg(value_name = "OPTIONS", trailing_var_arg = true, allow_hyphen_values = true)]
+    pub options: Vec<String>,
 }
 
 /// Arguments of `compare`.

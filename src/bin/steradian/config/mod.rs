@@ -68,6 +68,7 @@ pub struct Parsed {
 pub fn parse() -> Result<Parsed> {
     let line: Vec<OsString> = std::env::args_os().collect();
     check_utf8(&line)?;
+    let line = with_replay(line);
     if line.len() == 1 {
         log::line(FIRST_STEPS);
         std::process::exit(2);
@@ -111,6 +112,17 @@ fn exit(error: &clap::Error) -> ! {
         log::line(&message_lines(&format!("\n{hint}")));
     }
     std::process::exit(error.exit_code());
+}
+
+/// `replay SCENE X,Y I` as `render SCENE --pixel X,Y --sample I`, with the same options.
+fn with_replay(line: Vec<OsString>) -> Vec<OsString> {
+    let words: Vec<&str> = line.iter().filter_map(|word| word.to_str()).collect();
+    let [program, "replay", scene, pixel, sample, options @ ..] = &words[..] else { return line };
+    if [scene, pixel, sample].iter().any(|word| word.starts_with('-')) {
+        return line;
+    }
+    let render = [program, "render", scene, "--pixel", pixel, "--sample", sample];
+    render.iter().chain(options).map(OsString::from).collect()
 }
 
 /// Names go into files whose text is UTF-8: pictures, statistics, states.
