@@ -58,7 +58,7 @@ pub fn run(arguments: &DenoiseArgs, mut uses: FileUses) -> Result<()> {
     for task in &tasks {
         uses.read(&task.input, "a noisy picture")?;
         uses.write(&task.output, "a denoised picture")?;
-        task.also.iter().try_for_each(|path| uses.write(path, "--png"))?;
+        task.also.iter().try_for_each(|path| uses.write(path, "--output"))?;
         task.check()?;
     }
     let denoiser = Denoiser::open(arguments.oidn.oidn_library.as_deref(), arguments.threads)?;

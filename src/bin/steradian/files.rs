@@ -61,7 +61,7 @@ impl<'a> NamedFiles<'a> {
             Command::Denoise(arguments) => {
                 self.read.push((&arguments.input, "the noisy picture"));
                 self.written.push((arguments.output.clone(), "the denoised picture"));
-                self.written.extend(arguments.also.iter().map(|path| (path.clone(), "--png")));
+                self.written.extend(arguments.also.iter().map(|path| (path.clone(), "--output")));
             }
             Command::CheckExr(arguments) => {
                 self.read.extend(arguments.files.iter().map(|path| (path.as_path(), "a file to check")));

@@ -250,14 +250,22 @@ pub struct RenderArgs {
     /// Not with --guiding, --guide, --target-error or --regularize. Default: paths
     #[arg(long, value_name = "NAME", value_parser = names::plain::<CausticsDesc>(), help_heading = "Algorithm")]
     pub caustics: Option<CausticsDesc>,
-    /// Path guiding: sample directions by the incident radiance learned from earlier paths: on or off
+    /// Path guiding: sample directions by the incident radiance learned from earlier paths
     ///
     /// For scenes whose light comes by few ways, such as through a door ajar. Iterations double; each is guided by the
     /// samples of those before, and weighted by its inverse variance. Guiding ends where it does not pay. With
     /// --checkpoint and --resume the picture is the same bit for bit. Unsupported with --shard: each part would have to
     /// render nearly all samples to train the guide; --guide uses a trained one.
-    #[arg(long, value_name = "SWITCH", value_parser = parse_switch, help_heading = "Algorithm")]
+    #[
+        arg(
+            long, value_name = "on|off", num_args = 0..=1, default_missing_value = "on", value_parser = parse_switch,
+            help_heading = "Algorithm"
+        )
+    ]
     pub guiding: Option<bool>,
+    /// Do not guide paths, whatever the scene sets
+    #[arg(long, conflicts_with = "guiding", help_heading = "Algorithm")]
+    pub no_guiding: bool,
     /// Guide paths by what another render has learned: the --checkpoint of one with --guiding on
     ///
     /// The guide is not trained further, whatever --guiding says. Samples then depend on it alone, so that --shard,
@@ -418,7 +426,7 @@ impl RenderArgs {
             clamp: self.clamp,
             regularize: self.regularize,
             caustics: self.caustics,
-            guiding: self.guiding,
+            guiding: if self.no_guiding { Some(false) } else { self.guiding },
             guide: None,
             time_limit: self.time_limit,
             outputs: self.output.clone(),
