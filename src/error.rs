@@ -107,12 +107,33 @@ pub enum Error {
         /// The system's reason.
         message: String,
     },
+    /// Several faults of one file, two or more, in the order of their places.
+    #[error("{}", lines(.0))]
+    Several(Vec<Error>),
     /// Anything else.
     #[error("{0}")]
     Internal(String),
 }
 
+/// One line for each error.
+fn lines(errors: &[Error]) -> String {
+    errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+}
+
 impl Error {
+    /// All of these as one error; `None` if there are none.
+    pub fn from_all(mut errors: Vec<Error>) -> Option<Self> {
+        if errors.len() > 1 { Some(Self::Several(errors)) } else { errors.pop() }
+    }
+
+    /// The errors that it consists of: itself, unless there are several.
+    pub fn parts(&self) -> &[Error] {
+        match self {
+            Self::Several(errors) => errors,
+            single => std::slice::from_ref(single),
+        }
+    }
+
     /// The kind of fault.
     pub fn kind(&self) -> ErrorKind {
         match self {
@@ -122,6 +143,7 @@ impl Error {
             Self::Output { .. } => ErrorKind::Output,
             Self::Checkpoint { .. } => ErrorKind::Checkpoint,
             Self::OutOfMemory(_) | Self::Threads { .. } => ErrorKind::OutOfMemory,
+            Self::Several(errors) => errors.first().map_or(ErrorKind::Internal, Self::kind),
             Self::Embree(_) | Self::Internal(_) => ErrorKind::Internal,
         }
     }

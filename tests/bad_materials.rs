@@ -73,9 +73,9 @@ fn principled_materials_out_of_range() {
             format!("{place}.specular"),
             "what is inside has one index",
         ),
-        (with("thin", json!(1)), format!("{place}.thin"), "boolean"),
-        (with("multiscatter", json!("no")), format!("{place}.multiscatter"), "boolean"),
-        (with("metalic", json!(1)), place.to_owned(), "did you mean `metallic`?"),
+        (with("thin", json!(1)), format!("{place}.thin"), "true or false"),
+        (with("multiscatter", json!("no")), format!("{place}.multiscatter"), "true or false"),
+        (with("metalic", json!(1)), place.to_owned(), "did you mean \"metallic\"?"),
         (with("metallic", json!([1, 2])), format!("{place}.metallic"), "expected a number"),
     ];
     let scalars = [

@@ -121,7 +121,7 @@ fn an_interrupted_run_reports_what_there_is() {
 #[test]
 fn mistakes_are_named() {
     for (arguments, code, message) in [
-        (vec!["colour"], 2, "there are resolution, spp"),
+        (vec!["colour"], 2, "possible values: resolution, spp"),
         (vec!["--triangles", "0"], 2, "--triangles"),
         (vec!["--out", "/proc/no"], 5, "/proc/no"),
         (vec!["--accel", "quadtree"], 2, "quadtree"),

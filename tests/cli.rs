@@ -180,3 +180,100 @@ fn a_file_that_cannot_be_written_does_not_take_the_others_along() {
         assert!(rest.contains(&format!("wrote {file}")) && folder.path().join(file).exists(), "{rest:?}");
     }
 }
+
+#[test]
+fn the_program_alone_tells_what_to_do_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), "");
+    assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0));
+    let stderr = stderr_of(&output);
+    assert!(stderr.lines().count() < 12 && stderr.contains("  steradian render scene.json -o picture.exr"), "{stderr}");
+
+    let output = run(folder.path(), "scene.json");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr_of(&output).ends_with("To render a scene: steradian render scene.json\n"), "{}", stderr_of(&output));
+    let output = run(folder.path(), "render scene.json --samples 5");
+    assert!(stderr_of(&output).ends_with("In place of --samples: --spp N\n"), "{}", stderr_of(&output));
+}
+
+#[test]
+fn the_short_help_shows_the_common_options() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = |arguments: &str| {
+        let output = run(folder.path(), arguments);
+        let text = String::from_utf8(output.stdout).unwrap();
+        let names = text.lines().map(str::trim_start).filter(|line| line.starts_with('-'));
+        names
+            .filter_map(|line| line.split_whitespace().find(|word| word.starts_with("--")))
+            .map(str::to_owned)
+            .collect()
+    };
+    let [short, long]: [Vec<String>; 2] = [options("render -h"), options("render --help")];
+    assert!((18..=24).contains(&short.len()), "{short:?}");
+    assert!(long.len() > 50 && short.iter().all(|option| long.contains(option)), "{long:?}");
+    for option in ["--output", "--spp", "--size", "--threads", "--time-limit", "--denoise", "--quiet"] {
+        assert!(short.iter().any(|shown| shown.trim_end_matches(',') == option), "{option}: {short:?}");
+    }
+    assert!(!short.contains(&"--log-file".to_owned()) && long.contains(&"--log-file".to_owned()));
+
+    let help = String::from_utf8(run(folder.path(), "render --help").stdout).unwrap();
+    for value in ["- mis:", "- N:", "- agx:", "- whitted:", "- zips:"] {
+        assert!(help.contains(value), "{value} has no description: {help}");
+    }
+    let help = String::from_utf8(run(folder.path(), "bench scale --help").stdout).unwrap();
+    assert!(help.contains("- triangles:") && help.contains("triangles of a mesh"), "{help}");
+}
+
+#[test]
+fn info_shows_the_picture_the_camera_and_the_cost() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), "info scene.json");
+    let text = String::from_utf8(output.stdout).unwrap();
+    for part in ["24 x 16 pixels", "samples per pixel  2", "vertical fov degrees", "camera rays  768", " to ["] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let output = run(folder.path(), "info scene.json --json");
+    let value: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&value["picture"]["size"], &value["picture"]["samples_per_pixel"]), (&[24, 16].into(), &2.into()));
+    assert_eq!(value["cost"]["camera_rays"], 24 * 16 * 2);
+    assert!(value["cost"]["film_bytes"].as_u64().is_some_and(|bytes| bytes > 24 * 16 * 4), "{value}");
+    assert!(value["camera"]["position"][2].is_number() && value["geometry_bytes"].is_number(), "{value}");
+}
+
+#[test]
+fn one_sample_is_no_plural() {
+    let folder = tempfile::tempdir().unwrap();
+    let stderr = stderr_of(&run(folder.path(), "render scene.json -s 1 -t 1 -o a.exr"));
+    assert!(stderr.contains("1 sample per pixel,") && stderr.contains(", 1 thread,"), "{stderr}");
+}
+
+#[test]
+fn keys_of_the_scene_are_set_and_rerendered() {
+    let folder = tempfile::tempdir().unwrap();
+    let render = |arguments: &str| {
+        let output = run(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(0), "{arguments}: {}", stderr_of(&output));
+        let name = arguments.split_whitespace().last().unwrap();
+        output::read_exr(&folder.path().join(name)).unwrap()
+    };
+    let options = render("render scene.json -q --spp 3 --max-depth 2 --size 20x10 -o options.exr");
+    let set = "--set sampler.spp=3 --set integrator.max_depth=2 --set film.width=20 --set film.height=10";
+    let keys = render(&format!("render scene.json -q {set} -o keys.exr"));
+    let again = render("rerender keys.exr -q -o again.exr");
+    assert_eq!(keys.size, [20, 10]);
+    assert!(keys.layers == options.layers && again.layers == keys.layers);
+    let output = run(folder.path(), "render scene.json --set integrator.depth=3");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr_of(&output).contains("did you mean \"max_depth\"?"), "{}", stderr_of(&output));
+}
+
+#[test]
+fn one_sample_is_replayed_by_a_command_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let [command, options] = ["replay scene.json 3,4 1 --seed 5", "render scene.json --seed 5 --pixel 3,4 --sample 1"]
+        .map(|arguments| run(folder.path(), arguments));
+    assert!(command.status.success() && command.stdout.starts_with(b"radiance "), "{}", stderr_of(&command));
+    assert_eq!(command.stdout, options.stdout);
+    let output = run(folder.path(), "replay scene.json");
+    assert_eq!(output.status.code(), Some(2));
+}

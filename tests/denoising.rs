@@ -94,7 +94,7 @@ fn an_absent_library_or_another_file_is_named() {
     std::fs::write(root.join("other.so"), "no library").unwrap();
     std::fs::create_dir(root.join("empty")).unwrap();
     for (library, words) in [
-        ("missing.so", "there is no such file"),
+        ("missing.so", "no such file"),
         ("other.so", "cannot serve as Open Image Denoise"),
         ("empty", "pip install pyoidn"),
     ] {

@@ -200,7 +200,7 @@ fn other_commands_overwrite_nothing_that_they_read() {
         (format!("merge {shards} -o o.exr -o ./o.exr"), ["o.exr (--output)", "./o.exr (--output)"]),
         (format!("merge {shards} -o o.exr --log-file scene.1-of-2.shard"), ["(a shard)", "(--log-file)"]),
         ("denoise noisy.exr noisy.exr".to_owned(), ["(the noisy picture)", "(the denoised picture)"]),
-        ("denoise noisy.exr o.exr -o o.png -o ./o.png".to_owned(), ["o.png (--png)", "./o.png (--png)"]),
+        ("denoise noisy.exr o.exr -o o.png -o ./o.png".to_owned(), ["o.png (--output)", "./o.png (--output)"]),
         ("compare ref.exr noisy.exr --log-file ref.exr".to_owned(), ["(the reference)", "(--log-file)"]),
         ("check-exr ref.exr --log-file ref.exr".to_owned(), ["(a file to check)", "(--log-file)"]),
         ("info scene.json --log-file scene.json".to_owned(), ["(the scene)", "(--log-file)"]),

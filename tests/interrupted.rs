@@ -130,7 +130,7 @@ fn faults_of_checkpoints_have_their_codes() {
         ("other", 2, "the file exists"),
         ("other --resume", 6, "this is not a checkpoint"),
         ("scene.json --resume", 2, "scene.json (the scene) and scene.json (--checkpoint)"),
-        ("missing/a.state", 5, "there is no folder missing"),
+        ("missing/a.state", 5, "no folder missing"),
         ("/proc/a.state", 5, "no file can be created"),
         ("a.state --resume --spp 2 --seed 4", 6, "seed: 0 in the checkpoint, 4 requested"),
         ("a.state --resume --spp 1", 6, "2 samples already"),

@@ -359,10 +359,10 @@ fn media_that_make_no_sense() {
         ("materials.glass.priority", json!(1.5), "materials.glass.priority", "1.5"),
         ("materials.glass.priority", json!("high"), "materials.glass.priority", "\"high\""),
         ("materials.glass.priority", json!(3e9), "materials.glass.priority", "3000000000"),
-        ("materials.glass.priorty", json!(1), "materials.glass", "did you mean `priority`?"),
-        ("materials.glass.absorption", json!([1, 2, 3]), "materials.glass.absorption[0]", "1"),
+        ("materials.glass.priorty", json!(1), "materials.glass", "did you mean \"priority\"?"),
+        ("materials.glass.absorption", json!([1, 2, 3]), "materials.glass.absorption", "found a list of 3"),
         ("materials.glass.absorption", json!({ "distance": 1 }), "materials.glass.absorption", "`color`"),
-        ("materials.glass.absorption", json!({ "color": tint, "depth": 1 }), "materials.glass.absorption", "`depth`"),
+        ("materials.glass.absorption", json!({ "color": tint, "depth": 1 }), "materials.glass.absorption", "\"depth\""),
         (
             "materials.glass.absorption",
             absorption(json!([0, 1, 1]), json!(1)),

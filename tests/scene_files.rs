@@ -47,6 +47,21 @@ fn the_schema_accepts_scenes_and_refuses_slips() {
     let good = good_scene();
     let faults: Vec<String> = validator.iter_errors(&good).map(|e| e.to_string()).collect();
     assert!(faults.is_empty(), "{faults:?}");
+    // Short forms of lists and colours.
+    for (path, value) in [
+        ("shapes", json!({ "type": "cube" })),
+        ("shapes[0].transform", json!({ "scale": 2 })),
+        ("lights", json!({ "type": "environment", "radiance": 1 })),
+        ("lights[0].intensity", json!(3.5)),
+        ("textures.tiles.scale", json!(2)),
+        ("instances", json!({ "object": "pair" })),
+        ("outputs", json!({ "file": "a.exr", "layers": "albedo" })),
+    ] {
+        let mut scene = good_scene();
+        set(&mut scene, path, value);
+        assert!(validator.is_valid(&scene), "{path}");
+        Folder::new().compile(&scene).unwrap();
+    }
     for (path, value) in [
         ("shaeps", json!([])),
         ("camera.postion", json!([0, 0, 0])),

@@ -281,9 +281,9 @@ fn headers_that_make_no_sense_are_refused() {
     assert_code(&run(folder, "render scene.json -q --size 24x16 --spp 2 --shard 1/2 -o a.shard"), 0, "");
     let huge = 4_000_000_000_u32;
     let cases: [(&str, serde_json::Value, &str); 9] = [
-        ("/shard/count", json!(0), "there is no shard 1 of 0"),
-        ("/shard/index", json!(0), "there is no shard 0 of 2"),
-        ("/shard/index", json!(3), "there is no shard 3 of 2"),
+        ("/shard/count", json!(0), "no shard 1 of 0"),
+        ("/shard/index", json!(0), "no shard 0 of 2"),
+        ("/shard/index", json!(3), "no shard 3 of 2"),
         ("/film/layers/0", json!("beauté\u{1b}"), "unknown layer"),
         ("/film/crop", json!([1, 0, huge, 16]), "not within"),
         ("/film/crop", json!([0, 0, 0, 0]), "a.shard"),

@@ -107,6 +107,8 @@ mod relief;
 mod roulette;
 /// Scenes far too small, too large or too far away for 32-bit coordinates.
 mod scale;
+/// All faults of a scene file at once, in plain words.
+mod scene_faults;
 /// Meshes, comments, names and transforms of scene files, read as users write them.
 mod scene_files;
 /// Rays that leave a surface do not find it again, and do not leak out of closed boxes.

@@ -9,6 +9,8 @@ mod faults;
 mod functions;
 /// Which modules import which.
 mod imports;
+/// Plain words.
+mod phrases;
 
 /// All Rust code that is not generated.
 const CODE: &[&str] = &["build.rs", "src", "tests", "benches", "examples", "fuzz", "xtask"];

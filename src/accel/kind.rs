@@ -101,7 +101,7 @@ impl fmt::Display for AccelKind {
 /// Why a name is none of an accelerator.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "there is no accelerator \"{name}\"; there are {}, and options such as embree:high or embree:low+compact",
+    "unknown accelerator \"{name}\"; use one of {}, with options such as embree:high or embree:low+compact",
     kinds()
 )]
 pub struct UnknownAccel {

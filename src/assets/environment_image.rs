@@ -40,14 +40,14 @@ pub fn read_rgb_image(path: &Path) -> Result<RgbImage, AssetError> {
 fn read_exr(path: &Path) -> Result<RgbImage, AssetError> {
     let malformed = |e: &dyn std::fmt::Display| AssetError::Malformed(format!("not a readable EXR file: {e}"));
     let source = crate::file::open(path).map_err(|e| AssetError::missing(path, &e))?;
-    let headers = read_headers(path).map_err(|e| malformed(&e))?;
+    let headers = read_headers(path).map_err(AssetError::Malformed)?;
     let choose = |(part, header): (usize, &Header)| {
         let [r, g, b] =
             ["R", "G", "B"].map(|name| header.channels.list.iter().position(|channel| channel.name == *name));
         Some([r?, g?, b?].map(|channel| Place { part, channel }))
     };
     let flat = headers.iter().enumerate().filter(|(_, header)| !header.deep);
-    let requested = flat.filter_map(choose).next().ok_or_else(|| malformed(&"there are no channels R, G and B"))?;
+    let requested = flat.filter_map(choose).next().ok_or_else(|| malformed(&"no channels R, G and B"))?;
     let header = &headers[requested[0].part];
     // The size is checked first: memory is allocated before any pixel is read.
     let mut pixels = vec![[0.0; 3]; pixel_count(header).map_err(|e| malformed(&e))?];

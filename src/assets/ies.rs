@@ -117,7 +117,7 @@ fn parse(text: &str) -> Result<IesData, String> {
     let tilt = lines.find_map(|(_, line)| {
         line.trim().to_ascii_uppercase().strip_prefix("TILT=").map(|tilt| tilt.trim().to_owned())
     });
-    let tilt = tilt.ok_or("there is no line with TILT=: not an LM-63 file")?;
+    let tilt = tilt.ok_or("no line with TILT=: not an LM-63 file")?;
     let words = lines
         .flat_map(|(i, line)| line.split([' ', '\t', ',']).filter(|word| !word.is_empty()).map(move |word| (i, word)));
     let mut numbers = Numbers { words: words.collect::<Vec<_>>().into_iter() };

@@ -11,7 +11,7 @@ use image::{DynamicImage, ImageFormat, ImageReader};
 use super::AssetError;
 use super::jpeg_check::is_whole_jpeg;
 use crate::file::exr_blocks::{ChannelRow, Place, read_rows};
-use crate::file::exr_headers::check_claims;
+use crate::file::exr_headers::{check_claims, header_fault};
 use crate::image_data::{ImageData, Samples};
 
 /// More pixels than any texture has; a header that claims more is damaged, or means harm.
@@ -118,7 +118,9 @@ fn in_half_if_exact(samples: Vec<f32>) -> Samples {
 /// Reads the channels of the first flat part: R, G and B, or Y, or the only one, and alpha.
 fn read_exr(bytes: &[u8]) -> Result<ImageData, AssetError> {
     let malformed = |e: &dyn std::fmt::Display| AssetError::Malformed(format!("not a readable EXR image: {e}"));
-    let headers = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| malformed(&e))?.headers;
+    let headers = MetaData::read_from_buffered(Cursor::new(bytes), false)
+        .map_err(|e| AssetError::Malformed(header_fault(&e)))?
+        .headers;
     check_claims(&headers, bytes.len() as u64).map_err(|e| malformed(&e))?;
     let part = headers.iter().position(|header| !header.deep).ok_or_else(|| malformed(&"deep data is unsupported"))?;
     let (all, size) = (&headers[part].channels.list, headers[part].layer_size);

@@ -1,7 +1,7 @@
 //! OBJ files with their MTL: one mesh for each material. Colours behind the positions of vertices are sRGB, as
 //! exporters write them.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 use std::fmt::Display;
 use std::path::Path;
@@ -44,11 +44,12 @@ pub struct ObjMesh {
     pub material: Option<ObjMaterial>,
 }
 
-/// Reads an OBJ file; with `materials`, also the MTL files it names. Polygons become fans; points and lines are left
-/// out. Of a file with vertices and no faces the result is one mesh without triangles.
+/// Reads an OBJ file; with `materials`, also the MTL files it names, as far as they exist. Polygons become fans;
+/// points and lines are left out. Of a file with vertices and no faces the result is one mesh without triangles.
 ///
 /// # Errors
-/// If a file is missing or malformed, a face refers to what does not exist, or there are neither vertices nor faces.
+/// If the file is missing or one is malformed, a face refers to what does not exist, or there are neither vertices nor
+/// faces.
 pub fn read_obj(path: &Path, materials: bool) -> Result<Vec<ObjMesh>, AssetError> {
     // Comments and names in old files may be in any encoding.
     let bytes = file::without_mark(file::read(path).map_err(|e| AssetError::missing(path, &e))?);
@@ -66,12 +67,17 @@ pub fn read_obj(path: &Path, materials: bool) -> Result<Vec<ObjMesh>, AssetError
     let folder = path.parent().unwrap_or(Path::new(""));
     let trouble: RefCell<Option<AssetError>> = RefCell::new(None);
     let maps: RefCell<HashMap<String, ObjMaps>> = RefCell::default();
+    let missing = Cell::new(false);
     let options = tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
     let loaded = tobj::load_obj_buf(&mut text.as_bytes(), &options, |mtl| {
         if !materials {
             return Ok(Default::default());
         }
         let mtl = folder.join(mtl);
+        if is_missing(path, &mtl) {
+            missing.set(true);
+            return Ok(Default::default());
+        }
         let parsed = read_mtl(&mtl, &maps)
             .and_then(|text| tobj::load_mtl_buf(&mut text.as_bytes()).map_err(|e| mtl_fault(&mtl, &e)));
         parsed.map_err(|e| {
@@ -85,7 +91,7 @@ pub fn read_obj(path: &Path, materials: bool) -> Result<Vec<ObjMesh>, AssetError
     let (models, library) = loaded.map_err(|e| AssetError::Malformed(format!("not a valid OBJ file: {e}")))?;
     let library = if materials { library.unwrap_or_default() } else { Vec::new() };
     let maps = maps.into_inner();
-    if materials && used.names_a_library {
+    if materials && used.names_a_library && !missing.get() {
         let unknown = |(_, name): &&(usize, String)| !library.iter().any(|m| m.name == *name);
         if let Some((line, name)) = used.materials.iter().find(unknown) {
             return Err(AssetError::Malformed(format!("line {line}: no material named \"{name}\" in the MTL")));
@@ -102,6 +108,16 @@ pub fn read_obj(path: &Path, materials: bool) -> Result<Vec<ObjMesh>, AssetError
     }
     meshes.iter_mut().for_each(|mesh| mesh.mesh.origin = origin);
     Ok(meshes)
+}
+
+/// Whether the MTL of an OBJ does not exist, with a warning.
+fn is_missing(obj: &Path, mtl: &Path) -> bool {
+    let missing = mtl.try_exists().is_ok_and(|exists| !exists);
+    if missing {
+        let [obj, mtl] = [obj, mtl].map(Path::display);
+        tracing::warn!("{obj}: no MTL file {mtl}: the default material is used in place of its materials");
+    }
+    missing
 }
 
 /// One mesh for each material and set of attributes, in the order of their first faces.
@@ -269,10 +285,12 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_mtl_is_named() {
+    fn without_its_mtl_an_obj_has_no_materials() {
         let folder = tempfile::tempdir().unwrap();
         let path = write(&folder, "q.obj", format!("mtllib gone.mtl\n{QUAD}usemtl a\nf 1 2 3\n"));
-        assert!(matches!(read_obj(&path, true), Err(AssetError::Missing { file, .. }) if file.ends_with("gone.mtl")));
+        let meshes = read_obj(&path, true).unwrap();
+        assert_eq!((meshes.len(), meshes[0].mesh.triangles.len()), (1, 1));
+        assert_eq!(meshes[0].material, None);
         assert!(read_obj(&path, false).is_ok());
     }
 

@@ -125,7 +125,7 @@ fn placement(files: &CompileContext, desc: &CameraDesc) -> Result<DAffine3> {
         (Some(_), ..) => Err(files.error("camera", "give either `transform`, or `position`, `look_at` and `up`")),
         (None, position, _) => {
             let missing = if position.is_none() { "position" } else { "look_at" };
-            Err(files.error("camera", format!("`position` and `look_at` go together: there is no `{missing}`")))
+            Err(files.error("camera", format!("`position` and `look_at` go together: no `{missing}`")))
         }
     }
 }

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use super::CompileContext;
+use super::faults::Faults;
 use super::media::NamedMedia;
 use super::textures::{TextureTable, TextureUse};
 use crate::bsdf::{Beckmann, Coat, Conductor, Ggx, Lambert, SeparableGgx, diffuse_mean, mitsuba_diffuse_mean};
@@ -19,6 +20,7 @@ use crate::material::{
 use crate::medium::{Media, Medium};
 use crate::metal::{Metal, MetalNames};
 use crate::normal_perturbation::NormalPerturbation;
+use crate::suggestion::did_you_mean;
 use crate::texture::Texture;
 
 /// All materials and textures, with their names.
@@ -55,7 +57,8 @@ impl MaterialTable {
     /// The id of the material for shapes that name none: diffuse, albedo 1/2.
     pub const DEFAULT: MaterialId = MaterialId(0);
 
-    pub fn new(files: &CompileContext, desc: &SceneDesc, used: &UsedNames) -> Result<Self> {
+    /// All materials of a scene; for each that has a fault, which is kept, there is the default one.
+    pub fn new(files: &CompileContext, desc: &SceneDesc, used: &UsedNames, faults: &mut Faults) -> Result<Self> {
         let textures = TextureTable::new(files, desc, used)?;
         let default = Material::from(Lambert { albedo: Rgb::splat(0.5) });
         let mut table = Self {
@@ -70,7 +73,14 @@ impl MaterialTable {
         let media = NamedMedia::new(files, desc)?;
         let compiler = Compiler { files, textures: &textures, media: &media };
         for name in desc.materials.keys() {
-            table.add(&compiler, desc, name, &mut Vec::new())?;
+            let mut outer = Vec::new();
+            let added = table.add(&compiler, desc, name, &mut outer);
+            if faults.keep(added).is_none() {
+                // Those that consist of a faulty one have no fault of their own.
+                for name in outer.into_iter().chain([name.as_str()]) {
+                    table.names.insert(name.to_owned(), MaterialBinding::plain(Self::DEFAULT));
+                }
+            }
         }
         table.media = Media::new(table.medium_of.values().copied(), media.around(files, desc)?);
         table.textures = textures;
@@ -347,8 +357,13 @@ impl Compiler<'_> {
     ) -> Result<([f32; 3], [f32; 3])> {
         match (metal, eta, k) {
             (Some(name), None, None) => {
-                let unknown =
-                    || self.files.unknown(&format!("{path}.metal"), "metal", name, Metal::names(MetalNames::Steradian));
+                let metals: Vec<&str> = Metal::names(MetalNames::Steradian).collect();
+                let unknown = || {
+                    let hint = did_you_mean(name, metals.iter().copied(), ["\"", "\""]);
+                    let list = metals.join(", ");
+                    let message = format!("no metal named \"{name}\"{hint}: use one of {list}, or `eta` and `k`");
+                    self.files.error(&format!("{path}.metal"), message)
+                };
                 Metal::find(MetalNames::Steradian, name).map(|metal| (metal.eta, metal.k)).ok_or_else(unknown)
             }
             (None, Some(eta), Some(k)) => {

@@ -6,6 +6,7 @@ mod camera;
 mod check;
 mod coincident;
 mod composites;
+mod faults;
 mod identities;
 mod keyframes;
 mod lights;
@@ -47,6 +48,7 @@ use crate::scene::{Scene, SceneFeatures, Surface};
 use crate::suggestion::did_you_mean;
 use crate::texture::Texture;
 
+use faults::Faults;
 use identities::IdentityTable;
 use lights::LightTable;
 use materials::MaterialTable;
@@ -77,7 +79,8 @@ impl CheckedScene<'_> {
     pub fn compile(self) -> Result<Scene> {
         let Self { desc, files, camera } = self;
         let used = desc.used_names();
-        let materials = MaterialTable::new(&files, desc, &used)?;
+        let mut faults = Faults::default();
+        let materials = MaterialTable::new(&files, desc, &used, &mut faults)?;
         let mut builder = Builder {
             meshes: MeshStore::read(&files, desc, &used),
             files,
@@ -93,14 +96,26 @@ impl CheckedScene<'_> {
             space: RenderSpace::WORLD,
             object_spaces: Vec::new(),
         };
-        builder.add_world(desc, &used)?;
+        let prepared = builder.prepare_world(desc, &used, &mut faults);
+        if !faults.is_empty() {
+            // The faults of lights are reported with those of materials and shapes.
+            for (i, light) in desc.lights.iter().enumerate() {
+                let path = format!("lights[{i}]");
+                let textures = &builder.materials.textures;
+                faults.keep(lights::compile(&builder.files, &path, light, &RenderSpace::WORLD, textures));
+            }
+            faults.into_result()?;
+        }
+        builder.add_world(desc, prepared)?;
         builder.warn_of_coincident();
+        let mut faults = Faults::default();
         for (i, light) in desc.lights.iter().enumerate() {
             let path = format!("lights[{i}]");
             let group = builder.lights.group(&builder.files, &path, light.group())?;
-            let light = lights::compile(&builder.files, &path, light, &builder.space, &builder.materials.textures)?;
-            builder.lights.add([light], group);
+            let light = lights::compile(&builder.files, &path, light, &builder.space, &builder.materials.textures);
+            builder.lights.add(faults.keep(light), group);
         }
+        faults.into_result()?;
         let camera = camera::place_in(&builder.files, &desc.camera, camera, builder.space)?;
         builder.finish(desc, camera)
     }
@@ -108,6 +123,9 @@ impl CheckedScene<'_> {
 
 /// Why a transform cannot place anything.
 const SINGULAR: &str = "the transform is singular: it flattens the shape, or is not finite";
+
+/// Lists of names in messages are no longer than this.
+const MAX_LISTED: usize = 12;
 
 /// Where the scene comes from; makes errors and warnings.
 #[derive(Clone, Debug)]
@@ -140,7 +158,7 @@ impl CompileContext {
     /// Warns of a file that is not there and that nothing uses.
     fn warn_of_missing(&self, path: &str, name: &str) {
         if !self.source.assets.contains(name) && !self.source.asset(name).is_file() {
-            self.warn(path, format_args!("there is no file {name}; nothing uses it"));
+            self.warn(path, format_args!("no file {name}; nothing uses it"));
         }
     }
 
@@ -159,10 +177,20 @@ impl CompileContext {
         error.at(&self.source.file, &self.source.place(path), asset)
     }
 
-    /// The error for a name that does not exist, with a suggestion.
+    /// The error for a name that does not exist, with a suggestion or a list of the names.
     fn unknown<'a>(&self, path: &str, what: &str, name: &str, known: impl IntoIterator<Item = &'a str>) -> Error {
-        let hint = did_you_mean(name, known, ["\"", "\""]);
-        self.error(path, format!("no {what} named \"{name}\"{hint}"))
+        let known: Vec<&str> = known.into_iter().collect();
+        let hint = did_you_mean(name, known.iter().copied(), ["\"", "\""]);
+        let list = match known.len() {
+            0 => format!(": the scene has no {what}s"),
+            1..=MAX_LISTED if hint.is_empty() => {
+                let mut names = known;
+                names.sort_unstable();
+                format!(": use one of {}", names.join(", "))
+            }
+            _ => String::new(),
+        };
+        self.error(path, format!("no {what} named \"{name}\"{hint}{list}"))
     }
 }
 

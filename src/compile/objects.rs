@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 
 use super::Builder;
+use super::faults::Faults;
 use super::nesting::Nesting;
 use super::prepared::PreparedShape;
 use crate::desc::{InstanceDesc, SceneDesc, UsedNames};
@@ -21,33 +22,53 @@ struct PreparedObject {
     emitters: Vec<PreparedShape>,
 }
 
+/// The shapes of a scene, loaded and checked; each of the world with its number.
+#[derive(Default)]
+pub(super) struct PreparedWorld<'a> {
+    world: Vec<(usize, PreparedShape)>,
+    planes: Vec<PreparedShape>,
+    objects: BTreeMap<&'a str, Vec<PreparedShape>>,
+    nesting: Option<Nesting<'a>>,
+}
+
 impl Builder {
-    /// Adds the shapes of the world and all instances, in the render space that suits them.
-    pub(super) fn add_world(&mut self, desc: &SceneDesc, used: &UsedNames) -> Result<()> {
-        let (mut world, mut planes) = (Vec::with_capacity(desc.shapes.len()), Vec::new());
+    /// Loads and checks all shapes and instances.
+    pub(super) fn prepare_world<'a>(
+        &mut self,
+        desc: &'a SceneDesc,
+        used: &UsedNames,
+        faults: &mut Faults,
+    ) -> PreparedWorld<'a> {
+        let mut all = PreparedWorld::default();
         for (i, shape) in desc.shapes.iter().enumerate() {
-            let prepared =
-                self.prepare(&format!("shapes[{i}]"), i, shape, true)?.into_iter().map(|prepared| (i, prepared));
-            let (endless, others): (Vec<_>, Vec<_>) = prepared.partition(|(_, prepared)| prepared.is_plane());
-            planes.extend(endless);
-            world.extend(others);
+            let prepared = faults.keep(self.prepare(&format!("shapes[{i}]"), i, shape, true)).unwrap_or_default();
+            let (endless, others): (Vec<_>, Vec<_>) = prepared.into_iter().partition(PreparedShape::is_plane);
+            all.planes.extend(endless);
+            all.world.extend(others.into_iter().map(|prepared| (i, prepared)));
         }
-        let nesting = Nesting::new(&self.files, desc)?;
-        let mut objects = BTreeMap::new();
+        all.nesting = faults.keep(Nesting::new(&self.files, desc));
         for (name, object) in &desc.objects {
             let is_used = used.objects.contains(name);
             let mut shapes = Vec::new();
             for (k, shape) in object.shapes.iter().enumerate() {
-                shapes.extend(self.prepare(&format!("objects.{name}.shapes[{k}]"), k, shape, is_used)?);
+                let prepared = self.prepare(&format!("objects.{name}.shapes[{k}]"), k, shape, is_used);
+                shapes.extend(faults.keep(prepared).unwrap_or_default());
             }
             if is_used {
-                objects.insert(name.as_str(), shapes);
+                all.objects.insert(name.as_str(), shapes);
             } else {
                 self.files.warn(&format!("objects.{name}"), format_args!("no instance places this object"));
             }
         }
+        all
+    }
+
+    /// Adds the shapes of the world and all instances, in the render space that suits them.
+    pub(super) fn add_world(&mut self, desc: &SceneDesc, prepared: PreparedWorld) -> Result<()> {
+        let PreparedWorld { world, planes, objects, nesting } = prepared;
+        let Some(nesting) = &nesting else { return Ok(()) };
         let still = Motion::constant(DAffine3::IDENTITY);
-        let level = Level { desc, nesting: &nesting, path: "instances", outer: &still, placement: None };
+        let level = Level { desc, nesting, path: "instances", outer: &still, placement: None };
         self.space = self.render_space(&level, &world, &objects)?;
 
         for (i, prepared) in world {
@@ -72,7 +93,7 @@ impl Builder {
             self.surroundings =
                 self.surroundings.union(&Bounds { min: bounds.min.as_dvec3(), max: bounds.max.as_dvec3() });
         }
-        for (_, plane) in planes {
+        for plane in planes {
             let id = self.place(plane, &DAffine3::IDENTITY, &{ self.space })?;
             self.geometry.world.extend(id);
         }

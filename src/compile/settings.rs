@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
+use super::faults::Faults;
 use super::{CompileContext, camera};
 use crate::assets::SceneSource;
 use crate::camera::Camera;
@@ -24,16 +25,18 @@ impl<'a> CheckedScene<'a> {
     /// kind; errors name the places in that file.
     ///
     /// # Errors
-    /// [`Error::Scene`](crate::Error::Scene) with the key of the first number that makes no sense.
+    /// [`Error::Scene`](crate::Error::Scene) with the key of a number that makes no sense,
+    /// or [`Error::Several`](crate::Error::Several).
     pub fn new(desc: &'a SceneDesc, source: SceneSource) -> Result<Self> {
         let files = CompileContext::from(source);
-        check_film(&files, &desc.film)?;
+        let mut faults = Faults::default();
+        faults.keep(check_film(&files, &desc.film));
         if desc.sampler.spp == 0 {
-            return Err(files.error("sampler.spp", "must be at least 1"));
+            faults.keep::<()>(Err(files.error("sampler.spp", "must be at least 1")));
         }
-        let camera = camera::compile(&files, &desc.camera)?;
-        check_integrator(&files, &desc.integrator)?;
-        check_outputs(&files, &desc.outputs)?;
+        faults.keep(check_integrator(&files, &desc.integrator));
+        faults.keep(check_outputs(&files, &desc.outputs));
+        let camera = faults.check(camera::compile(&files, &desc.camera))?;
         Ok(Self { desc, files, camera })
     }
 }

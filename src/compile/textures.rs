@@ -7,6 +7,7 @@ use std::sync::Arc;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 use super::CompileContext;
+use super::faults::Faults;
 use crate::assets::{AssetError, read_image};
 use crate::attribute::{VERTEX_COLOR, is_of_faces};
 use crate::color::Rgb;
@@ -67,6 +68,7 @@ impl TextureTable {
             open: Vec::new(),
             made: HashMap::new(),
         };
+        let mut faults = Faults::default();
         for name in desc.textures.keys() {
             let place = format!("textures.{name}");
             if let Some(TextureDesc::Image { file, .. }) =
@@ -74,7 +76,7 @@ impl TextureTable {
             {
                 files.warn_of_missing(&format!("{place}.file"), file);
             }
-            let made = loader.named(&place, name, TextureUse::Color)?;
+            let Some(made) = faults.keep(loader.named(&place, name, TextureUse::Color)) else { continue };
             let color = table.push(made.texture);
             let data = if made.depends_on_use {
                 table.push(loader.named(&place, name, TextureUse::Data)?.texture)
@@ -83,6 +85,7 @@ impl TextureTable {
             };
             table.names.insert(name.clone(), Entry { color, data });
         }
+        faults.into_result()?;
         (table.images, table.attributes) = (loader.images, loader.attributes);
         Ok(table)
     }

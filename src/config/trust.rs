@@ -78,7 +78,21 @@ const OPTIONS: [(Trust, &[&str]); 3] = [
     ),
     (
         Trust::CommandLine,
-        &["pixel", "sample", "frames", "checkpoint", "resume", "guide", "shard", "json", "report", "help", "version"],
+        &[
+            "set",
+            "no-guiding",
+            "pixel",
+            "sample",
+            "frames",
+            "checkpoint",
+            "resume",
+            "guide",
+            "shard",
+            "json",
+            "report",
+            "help",
+            "version",
+        ],
     ),
 ];
 

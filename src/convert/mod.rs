@@ -51,7 +51,7 @@ pub fn write_scene(
     let mut files = AssetCopier::new(imported, source, target, originals);
     for NamedFile { path, name, is_used } in imported.desc.clone().files_mut() {
         if !is_used && !files.is_there(name) {
-            tracing::warn!("{}: {path}: there is no file {name}; nothing uses it", source.display());
+            tracing::warn!("{}: {path}: no file {name}; nothing uses it", source.display());
         }
     }
     let desc = copy_all(imported, &mut files)?;

@@ -96,9 +96,9 @@ impl Plan {
         match (albedo, normal) {
             (None, _) if options.without_features => {}
             (None, None) => {
-                notes.push("there are no layers of albedo and normals; with them more detail survives".to_owned());
+                notes.push("no layers of albedo and normals; with them more detail survives".to_owned());
             }
-            (None, Some(_)) => notes.push("there is no layer of albedo; normals without it are not used".to_owned()),
+            (None, Some(_)) => notes.push("no layer of albedo; normals without it are not used".to_owned()),
             _ => {}
         }
         let last = |name: &str| name.rsplit('.').next().unwrap_or(name).to_lowercase();

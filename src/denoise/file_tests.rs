@@ -96,7 +96,7 @@ fn layers_may_be_named_and_must_be_there() {
     };
     assert_eq!(found(&file, &named("diffcolor")).unwrap(), [triple(1.0), triple(3.0), triple(4.0)]);
     let absent = found(&file, &named("diffuse")).unwrap_err();
-    assert!(absent.starts_with("there is no layer diffuse with") && absent.contains("diffcolor.R"), "{absent}");
+    assert!(absent.starts_with("no layer diffuse with") && absent.contains("diffcolor.R"), "{absent}");
     let without = FileOptions { without_features: true, ..FileOptions::default() };
     assert_eq!(found(&file, &without).unwrap(), [triple(1.0), None, None]);
     assert!(Plan::new(&file, &without).unwrap().notes.is_empty());

@@ -57,9 +57,8 @@ impl<'f> Layers<'f> {
             .collect();
         // The sort is stable: of equals the first in the file.
         found.sort_by_key(|(name, _)| (!name.is_empty(), !name.contains("ombined"), name.len()));
-        let (name, rgb) = found
-            .first()
-            .ok_or_else(|| format!("there are no channels R, G and B; it has {}", self.channel_names()))?;
+        let (name, rgb) =
+            found.first().ok_or_else(|| format!("no channels R, G and B; it has {}", self.channel_names()))?;
         for place in rgb {
             let channel = &self.file.layer_data[place.part].channel_data.list[place.channel];
             if channel.sampling != Vec2(1, 1) {
@@ -111,7 +110,7 @@ impl<'f> Layers<'f> {
 
     /// The message for a layer that is not there.
     pub fn no_layer(&self, name: &str) -> String {
-        format!("there is no layer {name} with channels R, G, B or X, Y, Z; it has {}", self.channel_names())
+        format!("no layer {name} with channels R, G, B or X, Y, Z; it has {}", self.channel_names())
     }
 
     fn channel_names(&self) -> String {

@@ -141,17 +141,13 @@ fn open_named<T>(path: &Path, by: &str, open: &mut impl FnMut(&Path) -> std::res
         message: format!("{message} (named by {by})"),
     };
     let file = if path.is_dir() {
-        inside(path).ok_or_else(|| {
-            missing(path, format!("there is no {FILE_NAME} in the folder; `pip install pyoidn` installs it"))
-        })?
+        inside(path)
+            .ok_or_else(|| missing(path, format!("no {FILE_NAME} in the folder; `pip install pyoidn` installs it")))?
     } else if path.is_file() {
         // A bare name would be looked for among the system's libraries.
         path.canonicalize().map_err(|e| missing(path, e.to_string()))?
     } else {
-        return Err(missing(
-            path,
-            "there is no such file or folder; `pip install pyoidn` installs the library".to_owned(),
-        ));
+        return Err(missing(path, "no such file or folder; `pip install pyoidn` installs the library".to_owned()));
     };
     open(&file).map_err(|Unusable(why)| missing(&file, format!("it cannot serve as Open Image Denoise: {why}")))
 }
@@ -241,7 +237,7 @@ mod tests {
         fs::create_dir(&empty).unwrap();
         assert!(
             message(open_first(Some(&empty), &environment, |_| Ok(())))
-                .contains("there is no libOpenImageDenoise.so.2 in the folder")
+                .contains("no libOpenImageDenoise.so.2 in the folder")
         );
     }
 

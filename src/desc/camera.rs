@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::lists::{OneOrMore, one_or_more};
 use super::{KeyframeDesc, TransformDesc};
 
 /// A camera. Placed either by `position`, `look_at` and `up`, or by `transform`, which maps camera space (looking along
@@ -53,7 +54,8 @@ pub struct CameraDesc {
     pub shutter: [f64; 2],
     /// How the camera moves: what its placement is followed by at each time, rotations and translations. Default: not
     /// at all.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, deserialize_with = "one_or_more", skip_serializing_if = "Vec::is_empty")]
+    #[schemars(with = "OneOrMore<KeyframeDesc>")]
     pub motion: Vec<KeyframeDesc>,
 }
 

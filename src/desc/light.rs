@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::TransformDesc;
+use super::lists::{Spread, spread, spread_option};
 
 /// A light that is not a shape.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
@@ -44,6 +45,8 @@ pub struct PointLightDesc {
     /// Where it stands.
     pub position: [f64; 3],
     /// Radiant intensity (power per solid angle), linear RGB.
+    #[serde(deserialize_with = "spread")]
+    #[schemars(with = "Spread<3>")]
     pub intensity: [f32; 3],
     /// The light group, by name (letters, digits and underscores): the contribution of each group can be stored as an
     /// AOV. Default: none.
@@ -61,6 +64,8 @@ pub struct SpotLightDesc {
     /// A point it shines at.
     pub look_at: [f64; 3],
     /// Radiant intensity along the axis, linear RGB.
+    #[serde(deserialize_with = "spread")]
+    #[schemars(with = "Spread<3>")]
     pub intensity: [f32; 3],
     /// Half-angle in degrees outside which there is no light, above 0 and at most 180. Default: 20.
     #[serde(default = "default_cutoff")]
@@ -97,7 +102,8 @@ pub struct ProjectorLightDesc {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub texture: Option<String>,
     /// Factor on the picture: irradiance on the plane at distance 1, linear RGB. Default: [1, 1, 1].
-    #[serde(default = "white")]
+    #[serde(default = "white", deserialize_with = "spread")]
+    #[schemars(with = "Spread<3>")]
     pub irradiance: [f32; 3],
     /// Full angle in degrees from the picture's lower edge to its upper edge, above 0 and below 180.
     pub vertical_fov_degrees: f64,
@@ -132,7 +138,8 @@ pub struct IesLightDesc {
     #[serde(default)]
     pub rotation_degrees: f64,
     /// Radiant intensity for each candela of the file, linear RGB. Default: [1, 1, 1].
-    #[serde(default = "white")]
+    #[serde(default = "white", deserialize_with = "spread")]
+    #[schemars(with = "Spread<3>")]
     pub intensity: [f32; 3],
     /// The light group, by name (letters, digits and underscores): the contribution of each group can be stored as an
     /// AOV. Default: none.
@@ -151,6 +158,8 @@ pub struct DirectionalLightDesc {
     /// The direction in which light travels; any length.
     pub direction: [f64; 3],
     /// Irradiance on a surface perpendicular to the direction, linear RGB.
+    #[serde(deserialize_with = "spread")]
+    #[schemars(with = "Spread<3>")]
     pub irradiance: [f32; 3],
     /// Full angle in degrees that the light subtends, from 0 (a perfectly sharp shadow) to below 180; the sun has 0.53.
     /// A light with an angle is visible to rays that leave the scene. Default: 0.
@@ -167,7 +176,8 @@ pub struct DirectionalLightDesc {
 #[serde(deny_unknown_fields)]
 pub struct EnvironmentLightDesc {
     /// Constant radiance, linear RGB.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "spread_option", skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Spread<3>>")]
     pub radiance: Option<[f32; 3]>,
     /// A lat-long image (EXR or HDR), relative to the scene file. The image's top is +Y; its middle column is -Z, and
     /// +X lies at three quarters of the width.

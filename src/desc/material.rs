@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::PrincipledDesc;
+use super::lists::{Spread, spread, spread_option};
 
 /// A colour: `[r, g, b]`, one number for grey, or `{ "texture": "name" }`.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
@@ -158,10 +159,12 @@ pub enum MaterialDesc {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         metal: Option<String>,
         /// Real part of the index of refraction for red, green, blue; no texture, which `tint` can be.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[serde(default, deserialize_with = "spread_option", skip_serializing_if = "Option::is_none")]
+        #[schemars(with = "Option<Spread<3>>")]
         eta: Option<[f32; 3]>,
         /// Imaginary part (extinction) for red, green, blue.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[serde(default, deserialize_with = "spread_option", skip_serializing_if = "Option::is_none")]
+        #[schemars(with = "Option<Spread<3>>")]
         k: Option<[f32; 3]>,
         /// Roughness within `[0, 1]`; alpha is its square.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -404,6 +407,8 @@ impl DielectricDesc {
 #[serde(deny_unknown_fields)]
 pub struct AbsorptionDesc {
     /// What is left of red, green and blue after `distance`, each above 0 and at most 1.
+    #[serde(deserialize_with = "spread")]
+    #[schemars(with = "Spread<3>")]
     pub color: [f32; 3],
     /// In world units, above 0. Default: 1.
     #[serde(default = "one")]

@@ -2,11 +2,13 @@
 //! Schema (`steradian schema`) is made from the same types.
 //!
 //! World: right-handed, +Y up by custom; the camera looks along its local -Z with +Y up. Angles are in degrees, as
-//! their names end. Colours are linear Rec.709. Unknown keys are errors. Comments (`//` and `/* */`) are allowed.
+//! their names end. Colours are linear Rec.709. Unknown keys are errors. Comments (`//` and `/* */`) and
+//! commas behind the last entry are allowed; a list of one entry may be the entry alone, a grey one number.
 
 mod camera;
 mod files;
 mod light;
+mod lists;
 mod material;
 mod medium;
 mod output;
@@ -52,6 +54,8 @@ use schemars::JsonSchema;
 use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
+use lists::{OneOrMore, one_or_more};
+
 /// A scene: what to render, how, and where to write it.
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -87,19 +91,23 @@ pub struct SceneDesc {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub medium: Option<String>,
     /// Shapes in the world.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, deserialize_with = "one_or_more", skip_serializing_if = "Vec::is_empty")]
+    #[schemars(with = "OneOrMore<ShapeDesc>")]
     pub shapes: Vec<ShapeDesc>,
     /// Objects by name: groups of shapes that are drawn only where an instance places them.
     #[serde(default, deserialize_with = "unique_names", skip_serializing_if = "BTreeMap::is_empty")]
     pub objects: BTreeMap<String, ObjectDesc>,
     /// Placements of objects in the world.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, deserialize_with = "one_or_more", skip_serializing_if = "Vec::is_empty")]
+    #[schemars(with = "OneOrMore<InstanceDesc>")]
     pub instances: Vec<InstanceDesc>,
     /// Lights that are not shapes. (A shape becomes a light by its `emission`.)
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, deserialize_with = "one_or_more", skip_serializing_if = "Vec::is_empty")]
+    #[schemars(with = "OneOrMore<LightDesc>")]
     pub lights: Vec<LightDesc>,
     /// Files to write; the command line's `-o` replaces them.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, deserialize_with = "one_or_more", skip_serializing_if = "Vec::is_empty")]
+    #[schemars(with = "OneOrMore<OutputDesc>")]
     pub outputs: Vec<OutputDesc>,
 }
 

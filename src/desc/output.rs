@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::lists::{OneOrMore, one_or_more};
+
 /// A file to write; its extension (`.exr` or `.png`) selects the format.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -12,7 +14,8 @@ pub struct OutputDesc {
     /// Where, relative to the working directory.
     pub file: String,
     /// EXR: what to store beside the picture. Default: nothing.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, deserialize_with = "one_or_more", skip_serializing_if = "Vec::is_empty")]
+    #[schemars(with = "OneOrMore<LayerKind>")]
     pub layers: Vec<LayerKind>,
     /// EXR: how channels are named and put into parts, for the program that reads the file. Default: default.
     #[serde(default, skip_serializing_if = "is_default")]
@@ -194,7 +197,7 @@ impl ViewDesc {
     }
 }
 
-/// Whom an EXR file is made for.
+/// The application that an EXR file is made for: channel names, parts and compression.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ExrProfileDesc {

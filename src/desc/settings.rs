@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::lists::{Spread, spread};
+
 use super::ViewDesc;
 
 /// The picture's size and its pixel filter.
@@ -248,7 +250,8 @@ pub enum IntegratorDesc {
         #[serde(default = "whitted_depth")]
         max_depth: u32,
         /// Radiance of the ambient light that every diffuse surface reflects. Default: 0.
-        #[serde(default)]
+        #[serde(default, deserialize_with = "spread")]
+        #[schemars(with = "Spread<3>")]
         ambient: [f32; 3],
         /// As of `path`. Default: false.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::lists::{OneOrMore, Spread, one_or_more, spread};
 use super::{KeyframeDesc, TransformDesc};
 
 /// Declares the shapes: a struct for each, the fields that all share, and the enum over them.
@@ -27,7 +28,8 @@ macro_rules! shapes {
                 #[serde(default, skip_serializing_if = "TransformDesc::is_empty")]
                 pub transform: TransformDesc,
                 /// How the shape moves, after `transform`. Default: not at all.
-                #[serde(default, skip_serializing_if = "Vec::is_empty")]
+                #[serde(default, deserialize_with = "one_or_more", skip_serializing_if = "Vec::is_empty")]
+                #[schemars(with = "OneOrMore<KeyframeDesc>")]
                 pub motion: Vec<KeyframeDesc>,
                 /// How much of the surface is there: a number from 0 to 1, or `{ "texture": "name" }`. Rays, shadow
                 /// rays too, pass through the rest. Default: 1, or that of an MTL. Not with `emission`.
@@ -168,7 +170,8 @@ shapes! {
         /// A mesh that deforms: the files with its vertices at further times, evenly spaced until the shutter closes,
         /// as many and in the same order as in `file`, which has those at its opening. Between them vertices move along
         /// straight lines.
-        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        #[serde(default, deserialize_with = "one_or_more", skip_serializing_if = "Vec::is_empty")]
+        #[schemars(with = "OneOrMore<String>")]
         deform_files: Vec<String>,
         /// Inline: as `deform_files`, the positions at further times.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -439,6 +442,8 @@ pub enum OpacityDesc {
 #[serde(deny_unknown_fields)]
 pub struct EmissionDesc {
     /// Radiance, linear RGB.
+    #[serde(deserialize_with = "spread")]
+    #[schemars(with = "Spread<3>")]
     pub radiance: [f32; 3],
     /// A texture by name whose colour multiplies the radiance. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -457,8 +462,12 @@ pub struct EmissionDesc {
 #[serde(deny_unknown_fields, default)]
 pub struct ObjectDesc {
     /// Shapes of the group.
+    #[serde(deserialize_with = "one_or_more")]
+    #[schemars(with = "OneOrMore<ShapeDesc>")]
     pub shapes: Vec<ShapeDesc>,
     /// Other objects inside this one; any depth, no cycles.
+    #[serde(deserialize_with = "one_or_more")]
+    #[schemars(with = "OneOrMore<InstanceDesc>")]
     pub instances: Vec<InstanceDesc>,
 }
 
@@ -476,6 +485,7 @@ pub struct InstanceDesc {
     #[serde(default, skip_serializing_if = "TransformDesc::is_empty")]
     pub transform: TransformDesc,
     /// How it moves, after `transform`. Default: not at all.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, deserialize_with = "one_or_more", skip_serializing_if = "Vec::is_empty")]
+    #[schemars(with = "OneOrMore<KeyframeDesc>")]
     pub motion: Vec<KeyframeDesc>,
 }

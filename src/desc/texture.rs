@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ColorDesc;
+use super::lists::{Spread, spread};
 
 /// A texture. Every shape has its uv, described there; on an image the origin of uv is the bottom left corner and v
 /// grows upward.
@@ -13,18 +14,23 @@ pub enum TextureDesc {
     /// A checkerboard in uv.
     Checker {
         /// Colour of the square at the origin of uv. Default: 0.4.
-        #[serde(default = "dark")]
+        #[serde(default = "dark", deserialize_with = "spread")]
+        #[schemars(with = "Spread<3>")]
         color0: [f32; 3],
         /// Colour of its neighbours. Default: 0.2.
-        #[serde(default = "darker")]
+        #[serde(default = "darker", deserialize_with = "spread")]
+        #[schemars(with = "Spread<3>")]
         color1: [f32; 3],
         /// Repetitions of a pair of squares along u and v. Default: 1, 1.
-        #[serde(default = "unit_scale")]
+        #[serde(default = "unit_scale", deserialize_with = "spread")]
+        #[schemars(with = "Spread<2>")]
         scale: [f32; 2],
     },
     /// The same colour everywhere.
     Constant {
         /// The colour.
+        #[serde(deserialize_with = "spread")]
+        #[schemars(with = "Spread<3>")]
         color: [f32; 3],
     },
     /// An image, which fills the unit square of uv.
@@ -45,7 +51,8 @@ pub enum TextureDesc {
         wrap: WrapDesc,
         /// The image is looked up at `offset + R (scale * uv)`, where R turns from u towards v by `rotation_degrees`.
         /// So a scale of 2 shows it twice along each axis, and -1 mirrors it. Default: 1, 1.
-        #[serde(default = "unit_scale")]
+        #[serde(default = "unit_scale", deserialize_with = "spread")]
+        #[schemars(with = "Spread<2>")]
         scale: [f32; 2],
         /// See `scale`. Default: 0.
         #[serde(default)]

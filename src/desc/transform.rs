@@ -3,10 +3,16 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A list of steps, applied in the order written: the first acts on the shape first.
+use super::lists::{OneOrMore, one_or_more};
+
+/// A list of steps, applied in the order written: the first acts on the shape first. A single step needs no list.
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(transparent)]
-pub struct TransformDesc(pub Vec<TransformStepDesc>);
+pub struct TransformDesc(
+    #[serde(deserialize_with = "one_or_more")]
+    #[schemars(with = "OneOrMore<TransformStepDesc>")]
+    pub Vec<TransformStepDesc>,
+);
 
 impl TransformDesc {
     /// Whether there are no steps.

@@ -45,6 +45,12 @@ pub fn check_claims(headers: &[Header], bytes: u64) -> Result<(), String> {
     Ok(())
 }
 
+/// Why headers cannot be read.
+pub fn header_fault(error: &exr::error::Error) -> String {
+    let message = error.to_string();
+    if message.contains("file identifier missing") { "not an EXR file".to_owned() } else { message }
+}
+
 /// The headers of an EXR file, whose claims are checked.
 ///
 /// # Errors
@@ -52,7 +58,7 @@ pub fn check_claims(headers: &[Header], bytes: u64) -> Result<(), String> {
 pub fn read_headers(path: &Path) -> Result<Vec<Header>, String> {
     let file = super::open(path).map_err(|e| e.to_string())?;
     let bytes = file.limit();
-    let headers = MetaData::read_from_unbuffered(file, false).map_err(|e| e.to_string())?.headers;
+    let headers = MetaData::read_from_unbuffered(file, false).map_err(|e| header_fault(&e))?.headers;
     check_claims(&headers, bytes)?;
     Ok(headers.into_vec())
 }
@@ -69,6 +75,16 @@ mod tests {
             .write()
             .to_file(path)
             .unwrap();
+    }
+
+    #[test]
+    fn other_files_are_no_exr_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        for bytes in [&b"\x89PNG\r\n"[..], b"hello, world"] {
+            std::fs::write(&path, bytes).unwrap();
+            assert_eq!(read_headers(&path).unwrap_err(), "not an EXR file");
+        }
     }
 
     #[test]

@@ -203,7 +203,7 @@ fn create_aside(path: &Path, target: &Path) -> Result<Aside> {
         return Err(failed(path, "it has no name"));
     }
     if !folder.is_dir() {
-        return Err(failed(path, format!("there is no folder {}", folder.display())));
+        return Err(failed(path, format!("no folder {}", folder.display())));
     }
     Aside::create(target).map_err(|e| failed(path, format!("no file can be created in {}: {e}", folder.display())))
 }

@@ -1,20 +1,22 @@
-//! Comments in scene files: `//` to the end of the line and `/* */`, outside of strings.
+//! What scene files may have beyond JSON: comments, `//` to the end of the line and `/* */`, and a comma behind the
+//! last entry of a list or an object.
 
-/// A text without comments.
+/// A text that is plain JSON if the scene file is valid.
 pub struct Blanked {
-    /// The text with every comment (and a byte order mark) replaced by spaces, byte by byte; line breaks stay, so that
-    /// positions in messages are right.
+    /// The text with every comment, trailing comma and byte order mark replaced by spaces, byte by byte; line breaks
+    /// stay, so that positions in messages are right.
     pub text: String,
     /// Where a comment begins that never ends.
     pub open_comment: Option<usize>,
 }
 
-/// Replaces comments by spaces.
+/// Replaces comments and trailing commas by spaces.
 pub fn blank_comments(text: &str) -> Blanked {
     let mut out = Vec::with_capacity(text.len());
     let bytes = text.as_bytes();
     let mut state = State::Code;
     let mut comment_start = 0;
+    let mut commas = LastComma::default();
     let mut i = 0;
     if text.starts_with('\u{feff}') {
         i = '\u{feff}'.len_utf8();
@@ -33,6 +35,7 @@ pub fn blank_comments(text: &str) -> Blanked {
             }
             State::Code if byte == b'"' => state = State::Text,
             State::Text if byte == b'\\' => {
+                commas = LastComma::default();
                 out.push(byte);
                 if let Some(&escaped) = next {
                     out.push(escaped);
@@ -50,6 +53,11 @@ pub fn blank_comments(text: &str) -> Blanked {
             }
             _ => {}
         }
+        match state {
+            State::Code => commas.next(out.len(), byte).into_iter().for_each(|comma| out[comma] = b' '),
+            State::Text => commas = LastComma { at: None, last: b'"' },
+            State::Line | State::Block => {}
+        }
         let blank = matches!(state, State::Line | State::Block) && byte != b'\n';
         out.push(if blank { b' ' } else { byte });
         i += 1;
@@ -58,6 +66,31 @@ pub fn blank_comments(text: &str) -> Blanked {
     Blanked {
         text: String::from_utf8(out).unwrap_or_default(),
         open_comment: (state == State::Block).then_some(comment_start),
+    }
+}
+
+/// The comma that nothing but spaces and comments follow so far.
+#[derive(Default)]
+struct LastComma {
+    at: Option<usize>,
+    /// The last byte that is no space.
+    last: u8,
+}
+
+impl LastComma {
+    /// Takes the next byte outside of comments, which stands at `index`; gives the place of a comma that it makes a
+    /// trailing one.
+    fn next(&mut self, index: usize, byte: u8) -> Option<usize> {
+        if byte.is_ascii_whitespace() {
+            return None;
+        }
+        let comma = self.at.take();
+        // A comma behind nothing is a fault.
+        if byte == b',' && !b"[{,:".contains(&self.last) {
+            self.at = Some(index);
+        }
+        self.last = byte;
+        comma.filter(|_| matches!(byte, b']' | b'}'))
     }
 }
 
@@ -81,6 +114,18 @@ mod tests {
         let value: serde_json::Value = serde_json::from_str(&blank).unwrap();
         assert_eq!(value["a"], "// no");
         assert_eq!(value["b\"/*"], 1);
+    }
+
+    #[test]
+    fn trailing_commas_become_blanks() {
+        let text = "{ \"a\": [1, 2, // two\n ], \"b\": \",]\\\",\", \"c\": { \"d\": [[],], } /* end */ , }";
+        let blank = blank_comments(text).text;
+        assert_eq!(blank.len(), text.len());
+        let value: serde_json::Value = serde_json::from_str(&blank).unwrap();
+        assert_eq!(value, serde_json::json!({ "a": [1, 2], "b": ",]\",", "c": { "d": [[]] } }));
+        for fault in ["[,]", "[1,,]", "{,}", "{\"a\":,}", "[1],"] {
+            assert!(serde_json::from_str::<serde_json::Value>(&blank_comments(fault).text).is_err(), "{fault}");
+        }
     }
 
     #[test]

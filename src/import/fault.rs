@@ -32,15 +32,9 @@ pub fn path_text(steps: &[Step]) -> String {
 
 /// The steps of a path as serde tracked it, as far as the scene has them.
 pub fn steps_of(path: &serde_path_to_error::Path, scene: &Value) -> Vec<Step> {
-    use serde_path_to_error::Segment;
     let mut steps = Vec::new();
     let mut node = Some(scene);
-    for segment in path {
-        let step = match segment {
-            Segment::Seq { index } => Step::Index(*index),
-            Segment::Map { key } | Segment::Enum { variant: key } => Step::Key(key.clone()),
-            Segment::Unknown => break,
-        };
+    for step in steps_before(path) {
         node = node.and_then(|node| child(node, &step));
         if node.is_none() {
             break;
@@ -50,14 +44,28 @@ pub fn steps_of(path: &serde_path_to_error::Path, scene: &Value) -> Vec<Step> {
     steps
 }
 
-/// Follows the fault that lies within `steps` further inward; gives serde's message for it, if it still has one.
-pub fn refine(scene: &Value, steps: &mut Vec<Step>) -> Option<String> {
-    // A scene of nothing but the faulty part: cheap to try again.
-    let mut node = scene;
-    for step in steps.iter() {
-        node = child(node, step)?;
-    }
-    let mut trial = node.clone();
+/// The steps of a path as serde tracked it, up to the first that it does not know.
+pub fn steps_before(path: &serde_path_to_error::Path) -> Vec<Step> {
+    use serde_path_to_error::Segment;
+    let step = |segment: &Segment| match segment {
+        Segment::Seq { index } => Some(Step::Index(*index)),
+        Segment::Map { key } | Segment::Enum { variant: key } => Some(Step::Key(key.clone())),
+        Segment::Unknown => None,
+    };
+    path.iter().map_while(step).collect()
+}
+
+/// The scene's first fault: where it lies, and serde's message for it.
+pub fn first_fault(scene: &Value) -> Option<(Vec<Step>, String)> {
+    let error = serde_path_to_error::deserialize::<_, SceneDesc>(scene).err()?;
+    let mut steps = steps_of(error.path(), scene);
+    let message = refine(scene, &mut steps)?;
+    Some((steps, message))
+}
+
+/// A scene of nothing but the part that `steps` lead to, and where it lies there: cheap to read again.
+pub fn part_alone(scene: &Value, steps: &[Step]) -> Option<(Value, Vec<Step>)> {
+    let mut trial = node_at(scene, steps)?.clone();
     for step in steps.iter().rev() {
         trial = match step {
             Step::Key(key) => Value::Object([(key.clone(), trial)].into_iter().collect()),
@@ -67,9 +75,13 @@ pub fn refine(scene: &Value, steps: &mut Vec<Step>) -> Option<String> {
     if let (Value::Object(root), Some(Step::Key(_))) = (&mut trial, steps.first()) {
         root.entry("camera").or_insert_with(|| Value::Object(serde_json::Map::new()));
     }
-    let mut at: Vec<Step> =
-        steps.iter().map(|step| if let Step::Index(_) = step { Step::Index(0) } else { step.clone() }).collect();
+    let at = steps.iter().map(|step| if let Step::Index(_) = step { Step::Index(0) } else { step.clone() }).collect();
+    Some((trial, at))
+}
 
+/// Follows the fault that lies within `steps` further inward; gives serde's message for it, if it still has one.
+pub fn refine(scene: &Value, steps: &mut Vec<Step>) -> Option<String> {
+    let (mut trial, mut at) = part_alone(scene, steps)?;
     let message = fault(&trial)?;
     while let Some(step) = culprit(&mut trial, &at, &message) {
         at.push(step.clone());
@@ -97,7 +109,10 @@ fn culprit(scene: &mut Value, at: &[Step], message: &str) -> Option<Step> {
                 let Step::Key(key) = step else { return false };
                 let Some(Value::Object(map)) = follow(scene, at) else { return false };
                 let Some(taken) = map.remove(key) else { return false };
-                let changes = fault(scene).as_deref() != Some(message);
+                let changed = fault(scene);
+                let is_needed = message.starts_with("missing field")
+                    && changed.as_ref().is_some_and(|changed| *changed == format!("missing field `{key}`"));
+                let changes = !is_needed && changed.as_deref() != Some(message);
                 if let Some(Value::Object(map)) = follow(scene, at) {
                     map.insert(key.clone(), taken);
                 }
@@ -105,35 +120,47 @@ fn culprit(scene: &mut Value, at: &[Step], message: &str) -> Option<Step> {
             })
         }
         Value::Array(list)
-            if ["invalid type", "invalid value", "unknown", "missing"]
+            if ["invalid type", "invalid value", "invalid length", "unknown", "missing"]
                 .iter()
                 .any(|start| message.starts_with(start)) =>
         {
             // The shortest beginning of the list that has the fault ends with its cause; it is not the empty one.
-            let (mut low, mut high) = (0, list.len());
+            let list_length = list.len();
+            let (mut low, mut high) = (0, list_length);
             while low < high {
                 let middle = low.midpoint(high);
-                if beginning_has(scene, at, middle, message) {
+                if beginning_fault(scene, at, middle).as_deref() == Some(message) {
                     high = middle;
                 } else {
                     low = middle + 1;
                 }
             }
-            low.checked_sub(1).map(Step::Index)
+            // A list that is itself of the wrong length has another length without its end.
+            let last = low.checked_sub(1)?;
+            let without = beginning_fault(scene, at, last).and_then(|message| length_fault(&message));
+            let is_own = length_fault(message).is_some()
+                && (length_fault(message) == Some(list_length) && without == Some(last)
+                    || !matches!(node_at(scene, at)?.get(last), Some(Value::Array(_) | Value::Object(_))));
+            (!is_own).then_some(Step::Index(last))
         }
         _ => None,
     }
 }
 
-/// Whether the scene has the fault with no more than the first `length` entries of the list at `at`.
-fn beginning_has(scene: &mut Value, at: &[Step], length: usize, message: &str) -> bool {
-    let Some(Value::Array(list)) = follow(scene, at) else { return false };
+/// The length that the message calls wrong.
+fn length_fault(message: &str) -> Option<usize> {
+    message.strip_prefix("invalid length ")?.split(',').next()?.parse().ok()
+}
+
+/// The scene's fault with no more than the first `length` entries of the list at `at`.
+fn beginning_fault(scene: &mut Value, at: &[Step], length: usize) -> Option<String> {
+    let Some(Value::Array(list)) = follow(scene, at) else { return None };
     let mut rest = list.split_off(length);
-    let persists = fault(scene).as_deref() == Some(message);
+    let found = fault(scene);
     if let Some(Value::Array(list)) = follow(scene, at) {
         list.append(&mut rest);
     }
-    persists
+    found
 }
 
 fn child<'a>(node: &'a Value, step: &Step) -> Option<&'a Value> {
@@ -143,7 +170,13 @@ fn child<'a>(node: &'a Value, step: &Step) -> Option<&'a Value> {
     }
 }
 
-fn follow<'a>(scene: &'a mut Value, steps: &[Step]) -> Option<&'a mut Value> {
+/// What the steps lead to.
+pub fn node_at<'a>(scene: &'a Value, steps: &[Step]) -> Option<&'a Value> {
+    steps.iter().try_fold(scene, child)
+}
+
+/// As [`node_at`], to be changed.
+pub fn follow<'a>(scene: &'a mut Value, steps: &[Step]) -> Option<&'a mut Value> {
     steps.iter().try_fold(scene, |node, step| match step {
         Step::Key(key) => node.get_mut(key),
         Step::Index(index) => node.get_mut(index),

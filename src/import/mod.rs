@@ -2,10 +2,12 @@
 
 mod comments;
 mod fault;
+mod faults;
 mod fingerprint;
 mod foreign;
 mod scene_file;
 mod spectrum;
+mod wording;
 
 pub use fingerprint::{SceneFingerprint, files_of_scene, scene_fingerprint};
 pub use foreign::{Draft, ImportOptions, ImportReport, Imported, Outcome, ReportEntry, read_scene};
@@ -34,5 +36,13 @@ mod tests {
         let mut listed: Vec<_> = list.split(", ").map(|name| name.trim_matches('`')).collect();
         listed.sort_unstable();
         assert_eq!(listed, Metal::names(MetalNames::Steradian).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn words_of_other_programs_lead_to_words_of_the_schema() {
+        let schema = schema();
+        for word in crate::suggestion::targets() {
+            assert!(schema.contains(&format!("\"{word}\"")) || schema.contains(&format!("`{word}`")), "{word}");
+        }
     }
 }

@@ -7,9 +7,10 @@ use serde_json::error::Category;
 
 use super::comments::blank_comments;
 use super::fault::{self, Step};
+use super::faults::{all_faults, names_key};
+use super::wording;
 use crate::desc::SceneDesc;
 use crate::error::{Error, Result};
-use crate::suggestion::did_you_mean;
 
 /// Reads a scene file.
 ///
@@ -50,7 +51,7 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneDesc> {
     match parsed {
         Ok(scene) => match deserializer.end() {
             Ok(()) => Ok(scene),
-            Err(e) => Err(fault_at(path, text, offset(text, &e), describe(&e.to_string(), ""))),
+            Err(e) => Err(fault_at(path, text, offset(text, &e), wording::describe_syntax(&e.to_string()))),
         },
         Err(e) => Err(parse_fault(path, text, json, &e)),
     }
@@ -62,35 +63,41 @@ pub fn scene_as_written(path: &Path) -> Option<Value> {
     serde_json::from_str(&blank_comments(&text).text).ok()
 }
 
-/// The error for what serde complains about.
+/// The error for what serde complains about: all faults, as far as they can be told apart.
 fn parse_fault(path: &Path, text: &str, json: &str, error: &serde_path_to_error::Error<serde_json::Error>) -> Error {
     let inner = error.inner();
-    let serde_path = error.path().to_string();
-    let plain = |place: &str| fault_at(path, text, offset(text, inner), describe(&inner.to_string(), place));
-    let serde_place = if serde_path == "." { "" } else { &serde_path };
-    if inner.classify() != Category::Data {
-        return plain(serde_place);
-    }
+    let scene = serde_json::from_str::<Value>(json).ok();
+    let plain = |place: &[Step]| {
+        let message = with_place(&fault::path_text(place), &wording::describe_syntax(&inner.to_string()));
+        fault_at(path, text, offset(text, inner), message)
+    };
     // The text may break off further on, or name a key twice: then serde's own words must do.
-    let Ok(scene) = serde_json::from_str::<Value>(json) else {
-        return plain(serde_place);
+    let (Some(scene), Category::Data) = (scene, inner.classify()) else {
+        return plain(&fault::steps_before(error.path()));
     };
-    let mut steps = fault::steps_of(error.path(), &scene);
-    let Some(message) = fault::refine(&scene, &mut steps) else {
-        return plain(serde_place);
-    };
-    // Where the message itself names the last key, the place is the key's.
-    let names_key = match steps.last() {
-        Some(Step::Key(key)) => {
-            ["field", "variant"].iter().any(|what| message.starts_with(&format!("unknown {what} `{key}`")))
-        }
-        _ => false,
-    };
-    let start = fault::locate(json, &steps, names_key).unwrap_or_else(|| offset(text, inner));
-    if names_key {
-        steps.pop();
+    if !scene.is_object() {
+        let start = json.len() - json.trim_start().len();
+        return fault_at(path, text, start, wording::no_object(&scene));
     }
-    fault_at(path, text, start, describe(&message, &fault::path_text(&steps)))
+    let mut steps = fault::steps_of(error.path(), &scene);
+    let mut errors: Vec<(usize, Error)> = Vec::new();
+    if fault::refine(&scene, &mut steps).is_none() {
+        errors.push((offset(text, inner), plain(&steps)));
+    }
+    for fault in all_faults(&scene, text.len()) {
+        // Where the message itself names the last key, the place is the key's.
+        let names_key = names_key(&fault.steps, &fault.message).is_some();
+        let start = fault::locate(json, &fault.steps, names_key).unwrap_or_else(|| offset(text, inner));
+        let place = &fault.steps[..fault.steps.len() - usize::from(names_key)];
+        let message = with_place(&fault::path_text(place), &wording::describe(&fault, &scene));
+        errors.push((start, fault_at(path, text, start, message)));
+    }
+    errors.sort_by_key(|(start, _)| *start);
+    Error::from_all(errors.into_iter().map(|(_, error)| error).collect()).unwrap_or_else(|| plain(&[]))
+}
+
+fn with_place(place: &str, message: &str) -> String {
+    if place.is_empty() { message.to_owned() } else { format!("{place}: {message}") }
 }
 
 /// The error at a byte of the text; columns count characters.
@@ -105,22 +112,6 @@ fn fault_at(path: &Path, text: &str, offset: usize, message: String) -> Error {
 fn offset(text: &str, error: &serde_json::Error) -> usize {
     let line_start = text.split_inclusive('\n').take(error.line().saturating_sub(1)).map(str::len).sum::<usize>();
     text.floor_char_boundary(line_start + error.column().saturating_sub(1))
-}
-
-/// The message without its position (which stands elsewhere), with the path in front and a suggestion behind.
-fn describe(text: &str, place: &str) -> String {
-    let text = text.rsplit_once(" at line ").map_or(text, |(message, _)| message);
-    let place = if place.is_empty() { String::new() } else { format!("{place}: ") };
-    format!("{place}{text}{}", hint(text))
-}
-
-/// For "unknown field `x`, expected one of `a`, `b`": the expected word nearest to `x`.
-fn hint(message: &str) -> String {
-    if !(message.starts_with("unknown field") || message.starts_with("unknown variant")) {
-        return String::new();
-    }
-    let mut words = message.split('`').skip(1).step_by(2);
-    words.next().map_or(String::new(), |given| did_you_mean(given, words, ["`", "`"]))
 }
 
 #[cfg(test)]
@@ -143,11 +134,11 @@ mod tests {
     #[test]
     fn a_typo_has_its_place_and_a_suggestion() {
         let text = "{\n \"camera\": {},\n \"shapes\": [{ \"type\": \"sphere\", \"radus\": 2 }]\n}";
-        assert_message(text, "s.json:3:33: shapes[0]: ", &["`radus`", "did you mean `radius`"]);
+        assert_message(text, "s.json:3:33: shapes[0]: ", &["unknown key \"radus\" (did you mean \"radius\"?)"]);
         assert_message(
             "{ \"camera\": {}, \"shaeps\": [] }",
-            "s.json:1:17: unknown field `shaeps`",
-            &["did you mean `shapes`"],
+            "s.json:1:17: unknown key \"shaeps\"",
+            &["did you mean \"shapes\""],
         );
     }
 
@@ -157,25 +148,29 @@ mod tests {
             format!("{{ \"camera\": {{}}, // é\n \"shapes\": [{{ \"type\": \"cube\" }},\n {{ {body} }}] }}")
         };
         let text = shape("\"type\": \"sphere\", \"z_max\": \"high\"");
-        assert_message(&text, "s.json:3:31: shapes[1].z_max: invalid type: string \"high\"", &[]);
+        assert_message(&text, "s.json:3:31: shapes[1].z_max: expected a number, found the text \"high\"", &[]);
         let text = shape("\"emission\": { \"radiance\": [1, true, 1] }, \"type\": \"disk\"");
-        assert_message(&text, "s.json:3:34: shapes[1].emission.radiance[1]: invalid type: boolean", &[]);
+        assert_message(&text, "s.json:3:34: shapes[1].emission.radiance[1]: expected a number, found true", &[]);
         let text = shape("\"type\": \"disk\", \"emission\": {}");
-        assert_message(&text, "s.json:3:32: shapes[1].emission: missing field `radiance`", &[]);
+        assert_message(&text, "s.json:3:32: shapes[1].emission: `radiance` is missing", &[]);
         let text = shape("\"type\": \"cube\", \"transform\": [{ \"scale\": 2 }, { \"trnslate\": [1, 2, 3] }]");
-        assert_message(&text, "s.json:3:", &["shapes[1].transform[1]", "did you mean `translate`"]);
+        assert_message(
+            &text,
+            "s.json:3:",
+            &["shapes[1].transform[1]", "unknown key \"trnslate\" (did you mean \"translate\"?)"],
+        );
         let text =
             "{ \"camera\": {}, \"objects\": { \"o\": { \"shapes\": [{ \"type\": \"quad\", \"origin\": [1, 2] }] } } }";
-        assert_message(text, "s.json:1:", &["objects.o.shapes[0].origin: invalid length 2"]);
+        assert_message(text, "s.json:1:", &["objects.o.shapes[0].origin: expected a list of three numbers, found two"]);
     }
 
     #[test]
     fn unknown_types_are_named() {
         let text = "{ \"camera\": {}, \"shapes\": [{ \"type\": \"shpere\" }] }";
-        assert_message(text, "s.json:1:38: shapes[0].type: unknown variant `shpere`", &["did you mean `sphere`"]);
+        assert_message(text, "s.json:1:38: shapes[0].type: unknown type \"shpere\"", &["did you mean \"sphere\""]);
         assert_message(
             "{ \"camera\": {}, \"shapes\": [{ \"radius\": 1 }] }",
-            "s.json:1:28: shapes[0]: missing field `type`",
+            "s.json:1:28: shapes[0]: `type` is missing",
             &[],
         );
     }
@@ -198,11 +193,11 @@ mod tests {
         let text =
             "{ \"camera\": {}, \"materials\": { \"a\": { \"type\": \"mirror\" }, \"a\": { \"type\": \"diffuse\" } } }";
         assert_message(text, "s.json:1:", &["\"a\" is given twice"]);
-        assert_message("{ \"camera\": {}, \"camera\": {} }", "s.json:1:", &["duplicate field `camera`"]);
+        assert_message("{ \"camera\": {}, \"camera\": {} }", "s.json:1:", &["`camera` is given twice"]);
         assert_message(
             "{ \"camera\": { \"position\": [0, 0, 0], \"position\": [1, 1, 1] } }",
             "s.json:1:",
-            &["duplicate field `position`"],
+            &["`position` is given twice"],
         );
     }
 

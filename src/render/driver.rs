@@ -72,7 +72,7 @@ impl RenderSession<'_> {
     fn check_time(&self, stats: &Stats, done: u32) -> Result<()> {
         match self.settings.time_limit.filter(|_| stats.time_limited && done == 0) {
             Some(limit) => {
-                let message = "twice that time was not enough for a sample of every pixel: there is no picture";
+                let message = "twice that time was not enough for a sample of every pixel: no picture";
                 Err(Error::Usage(format!("--time-limit {}: {message}", limit.as_secs_f64())))
             }
             None => Ok(()),

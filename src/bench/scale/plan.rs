@@ -120,7 +120,7 @@ const DEPTH: u32 = 8;
 pub(super) fn sweeps(options: &ScaleOptions) -> Result<Vec<Sweep>> {
     if let Some(name) = options.sweeps.iter().find(|name| SWEEPS.iter().all(|(known, _)| known != name)) {
         let known: Vec<&str> = SWEEPS.iter().map(|(known, _)| *known).collect();
-        return Err(Error::Usage(format!("there is no sweep \"{name}\"; there are {}", known.join(", "))));
+        return Err(Error::Usage(format!("unknown sweep \"{name}\"; use one of {}", known.join(", "))));
     }
     let selected = |name: &str| options.sweeps.is_empty() || options.sweeps.iter().any(|sweep| sweep == name);
     Ok(SWEEPS.iter().filter(|(name, _)| selected(name)).map(|(name, axis)| sweep(name, axis, options)).collect())

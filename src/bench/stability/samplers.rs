@@ -14,7 +14,7 @@ checks! {
         "Owen-scrambled Sobol points, blocks of 2^k samples for k from 2 to 10, from the first and from later ones: \
          each dimension, and the first two of a set together in all shapes of base 2 (pbrt, samplers_test.cpp)";
     "S2" s2_any_order "samples do not depend on their order":
-        "samples of random pixels and sets forwards, backwards and from a sampler made anew, bit for bit (pbrt, \
+        "samples of random pixels and sets forwards, backwards and from a new sampler, bit for bit (pbrt, \
          Sampler.ConsistentValues)";
     "S3" s3_range "numbers are in [0, 1)":
         "2^24 samples of four dimensions from both samplers; the extremes are reached to 1e-6 (pbrt, Generators)";

@@ -1,5 +1,6 @@
 //! `steradian bench`.
 
+use std::io::IsTerminal;
 use std::io::Write;
 use std::path::Path;
 
@@ -41,7 +42,8 @@ fn accel(arguments: &BenchAccelArgs) -> Result<u8> {
         check_folder(folder, "accel.json")?;
     }
     let interrupt = Interrupt::listen()?;
-    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt, lines: false };
+    let lines = !arguments.quiet && !std::io::stderr().is_terminal();
+    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt, lines };
     let options = options(arguments);
     let machine = Machine::here();
     let mut scenes: Vec<SceneReport> = Vec::new();
@@ -93,7 +95,8 @@ fn reports(arguments: &BenchReportsArgs) -> Result<u8> {
         check_folder(folder, "reports.json")?;
     }
     let interrupt = Interrupt::listen()?;
-    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt, lines: false };
+    let lines = !arguments.quiet && !std::io::stderr().is_terminal();
+    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt, lines };
     let defaults = ReportsOptions::default();
     let tests = if arguments.full { u64::MAX } else { defaults.tests };
     let report =
@@ -118,7 +121,8 @@ fn stability(arguments: &BenchStabilityArgs) -> Result<u8> {
         check_folder(folder, "stability.json")?;
     }
     let interrupt = Interrupt::listen()?;
-    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt, lines: false };
+    let lines = !arguments.quiet && !std::io::stderr().is_terminal();
+    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt, lines };
     let machine = Machine::here();
     let effort = if arguments.quick { Effort::Quick } else { Effort::Full };
     let kept = match &arguments.out {

@@ -89,7 +89,7 @@ fn describe(findings: &[&(String, Finding)], files: usize, all: bool) -> Vec<Str
                 .collect()
         }
     };
-    lines.extend([format!("    {effect}"), format!("    mend: {mend}")]);
+    lines.extend([format!("    {effect}"), format!("    fix: {mend}")]);
     lines
 }
 
@@ -119,7 +119,7 @@ mod tests {
             "    a.exr: part 0 c2: c2 is half",
             "    ... and 37 more (-v for all)",
             "    It is read wrongly",
-            "    mend: Store floats",
+            "    fix: Store floats",
         ];
         assert_eq!(
             (&many[..], &mild[0][..]),

@@ -58,7 +58,7 @@ pub fn run(arguments: &DenoiseArgs, mut uses: FileUses) -> Result<()> {
     for task in &tasks {
         uses.read(&task.input, "a noisy picture")?;
         uses.write(&task.output, "a denoised picture")?;
-        task.also.iter().try_for_each(|path| uses.write(path, "--png"))?;
+        task.also.iter().try_for_each(|path| uses.write(path, "--output"))?;
         task.check()?;
     }
     let denoiser = Denoiser::open(arguments.oidn.oidn_library.as_deref(), arguments.threads)?;
@@ -173,7 +173,7 @@ fn tasks(arguments: &DenoiseArgs) -> Result<Vec<Task>> {
     }
     let frames = pattern.frames()?;
     if frames.is_empty() {
-        return Err(Error::Missing { file: input.clone(), message: "there is no frame of this sequence".to_owned() });
+        return Err(Error::Missing { file: input.clone(), message: "no frame of this sequence".to_owned() });
     }
     let fill =
         |path: &Path, frame: u64| Pattern::new(path).map_or_else(|| path.to_owned(), |pattern| pattern.file(frame));

@@ -38,6 +38,8 @@ impl<'a> NamedFiles<'a> {
                 self.written.extend(named.into_iter().filter_map(|(path, option)| Some((path.clone()?, option))));
                 self.import = Some(&arguments.import);
             }
+            // The command line has no other form of it that is valid.
+            Command::Replay(_) => {}
             Command::Rerender(arguments) => {
                 self.read.push((&arguments.file, "the picture to render again"));
                 self.read.extend(arguments.scene.iter().map(|path| (path.as_path(), SCENE)));
@@ -59,7 +61,7 @@ impl<'a> NamedFiles<'a> {
             Command::Denoise(arguments) => {
                 self.read.push((&arguments.input, "the noisy picture"));
                 self.written.push((arguments.output.clone(), "the denoised picture"));
-                self.written.extend(arguments.also.iter().map(|path| (path.clone(), "--png")));
+                self.written.extend(arguments.also.iter().map(|path| (path.clone(), "--output")));
             }
             Command::CheckExr(arguments) => {
                 self.read.extend(arguments.files.iter().map(|path| (path.as_path(), "a file to check")));

@@ -16,6 +16,7 @@ use steradian::{Error, Result};
 use crate::args::StateArgs;
 use crate::interrupt::Interrupt;
 use crate::progress::Reporter;
+use crate::text::counted;
 
 /// The extension of shards.
 const EXTENSION: &str = "shard";
@@ -96,7 +97,11 @@ impl<'a> Resumable<'a> {
         let state = match self.checkpoint.as_ref().filter(|_| self.arguments.resume) {
             Some(file) if file.path().exists() => {
                 let state = RenderState::read(file.path(), header, scene, settings)?;
-                reporter.say(&format!("{}: continuing after {} samples per pixel", file.path().display(), state.done));
+                reporter.say(&format!(
+                    "{}: continuing after {} per pixel",
+                    file.path().display(),
+                    counted(u64::from(state.done), "sample")
+                ));
                 state
             }
             Some(file) => {

@@ -26,6 +26,7 @@ mod progress;
 mod render;
 mod rerender;
 mod scene;
+mod set;
 mod skipped;
 mod stats;
 mod text;
@@ -50,7 +51,7 @@ fn main() -> ExitCode {
     match config::parse().and_then(start) {
         Ok(code) => ExitCode::from(code),
         Err(error) => {
-            log::message(Level::Error, &chain(&error));
+            error.parts().iter().for_each(|error| log::message(Level::Error, &chain(error)));
             ExitCode::from(exit_code(error.kind()))
         }
     }
@@ -93,6 +94,7 @@ fn run(cli: Cli, uses: FileUses) -> Result<u8> {
         Command::Merge(arguments) => merge::run(&arguments, uses).map(|()| 0),
         Command::CheckExr(arguments) => check_exr::run(&arguments),
         Command::Rerender(arguments) => rerender::run(&arguments, uses),
+        Command::Replay(_) => Err(Error::Usage("replay: give the scene, the pixel and the sample first".into())),
         Command::Compare(arguments) => compare::run(&arguments).map(|()| 0),
         Command::Denoise(arguments) => denoise::run(&arguments, uses).map(|()| 0),
         Command::Completions { shell } => {

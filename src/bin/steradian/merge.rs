@@ -11,6 +11,7 @@ use steradian::{Error, Result};
 
 use crate::args::MergeArgs;
 use crate::log::{self, Level};
+use crate::text::counted;
 
 /// Merges shards and writes the picture.
 pub fn run(arguments: &MergeArgs, mut uses: FileUses) -> Result<()> {
@@ -42,7 +43,10 @@ pub fn run(arguments: &MergeArgs, mut uses: FileUses) -> Result<()> {
     let [width, height] = [image.crop.width, image.crop.height];
     log::message(
         Level::Note,
-        &format!("{width}x{height} pixels, {} samples per pixel{partial}", info.samples_per_pixel),
+        &format!(
+            "{width}x{height} pixels, {} per pixel{partial}",
+            counted(u64::from(info.samples_per_pixel), "sample")
+        ),
     );
     outputs.iter().for_each(|output| log::message(Level::Note, &format!("wrote {}", output.file)));
     Ok(())

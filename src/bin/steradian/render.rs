@@ -23,8 +23,10 @@ use crate::frames::{Session, Shot};
 use crate::kept::{self, Resumable};
 use crate::progress::Reporter;
 use crate::rerender;
+use crate::set;
 use crate::skipped::Skipped;
 use crate::stats::{self, Run};
+use crate::text::counted;
 use crate::{files, text};
 
 /// Renders a picture and writes its outputs; the result is the exit code. `start` is when the scene's reading began.
@@ -108,7 +110,12 @@ impl<'a> Plan<'a> {
             }
             None => {
                 overrides.guide = arguments.guide.as_deref().map(TrainedGuide::read).transpose()?;
-                Settings::new(&shot.imported.desc, &overrides)?
+                let desc = &shot.imported.desc;
+                if arguments.set.is_empty() {
+                    Settings::new(desc, &overrides)?
+                } else {
+                    Settings::new(&set::changed(desc, &arguments.set)?, &overrides)?
+                }
             }
         };
         if arguments.pixel.is_none() {
@@ -287,7 +294,7 @@ fn warn_of_dropped(stats: &Stats, reporter: &Reporter) {
     let Some(first) = stats.dropped.first() else { return };
     let (count, noun) = (stats.nan_samples, if stats.nan_samples == 1 { "sample was" } else { "samples were" });
     reporter.warn(&format!(
-        "{count} {noun} not finite and dropped (this is a bug; --pixel {},{} --sample {} replays the first)",
+        "{count} {noun} not finite and dropped (this is a bug; `steradian replay SCENE {},{} {}` replays the first)",
         first.x, first.y, first.sample
     ));
 }
@@ -300,14 +307,14 @@ fn report(reporter: &Reporter, settings: &Settings, accel: &dyn Accelerator, sta
         _ => "",
     };
     reporter.say(&format!(
-        "{}x{} pixels, {} samples per pixel{ended}, {:.2} s, {:.2} Msamples/s, {:.2} Mrays/s, {} threads, {}",
+        "{}x{} pixels, {} per pixel{ended}, {:.2} s, {:.2} Msamples/s, {:.2} Mrays/s, {}, {}",
         settings.crop.width,
         settings.crop.height,
-        stats.spp_done,
+        counted(u64::from(stats.spp_done), "sample"),
         stats.render_seconds,
         stats.samples as f64 / seconds * 1e-6,
         stats.rays.total() as f64 / seconds * 1e-6,
-        settings.threads,
+        counted(settings.threads as u64, "thread"),
         accel.description(),
     ));
     if let (Some(error), Some(target)) = (stats.estimated_error, settings.target_error) {

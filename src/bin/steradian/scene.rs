@@ -9,6 +9,7 @@ use steradian::{Error, Result};
 use crate::args::{ImportArgs, Verbosity};
 use crate::log::{self, Level};
 use crate::text;
+use crate::text::counted;
 
 /// Lines of the summary that are shown without `-v`; more if more elements are ignored as a whole.
 const SUMMARY_LINES: usize = 12;
@@ -56,8 +57,11 @@ fn lines(path: &Path, imported: &Imported, verbose: bool) -> Vec<String> {
     }
     let counts = [Outcome::Mapped, Outcome::Approximated, Outcome::Ignored].map(|outcome| report.count(outcome));
     let [mapped, approximated, ignored] = counts;
-    let head =
-        format!("{}: {mapped} parameters mapped, {approximated} approximated, {ignored} ignored", path.display());
+    let head = format!(
+        "{}: {} mapped, {approximated} approximated, {ignored} ignored",
+        path.display(),
+        counted(mapped as u64, "parameter")
+    );
     if verbose {
         return std::iter::once(head).chain(report.entries.iter().map(line)).collect();
     }
@@ -65,9 +69,10 @@ fn lines(path: &Path, imported: &Imported, verbose: bool) -> Vec<String> {
     let (mut summary, others) = report.kinds();
     let shown = others.len().min(SUMMARY_LINES.saturating_sub(summary.len()));
     let rest = others.len() - shown;
+    let kinds = if rest == 1 { "kind" } else { "kinds" };
     summary.extend(others.into_iter().take(shown));
     if rest > 0 {
-        summary.push(format!("... and {rest} more kinds (-v or --report FILE for all)"));
+        summary.push(format!("... and {rest} more {kinds} (-v or --report FILE for all)"));
     }
     std::iter::once(head).chain(summary.into_iter().map(|line| format!("  {line}"))).collect()
 }
@@ -94,11 +99,11 @@ mod tests {
         assert!(lines(Path::new("s.json"), &Draft::default().finish(), true).is_empty());
         draft.mapped("s.xml:1:1", "film", "width");
         for i in 0..20 {
-            draft.ignored("s.xml:2:1", "film", &format!("p{i}"), "there is no such thing");
+            draft.ignored("s.xml:2:1", "film", &format!("p{i}"), "no such thing");
         }
         let imported = draft.finish();
         let short = lines(Path::new("s.xml"), &imported, false);
-        assert_eq!(short[0], "s.xml: 1 parameters mapped, 0 approximated, 20 ignored");
+        assert_eq!(short[0], "s.xml: 1 parameter mapped, 0 approximated, 20 ignored");
         assert_eq!((short.len(), short[13].contains("8 more kinds")), (14, true));
         assert_eq!(lines(Path::new("s.xml"), &imported, true).len(), 22);
     }

@@ -27,6 +27,11 @@ pub fn print_json(value: &Value) -> Result<()> {
     print(&format!("{value:#}"))
 }
 
+/// A number with what it counts: `1 sample`, `2 samples`.
+pub fn counted(number: u64, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
+
 /// A JSON value as aligned lines, nested objects indented.
 pub fn outline(value: &Value) -> String {
     let mut lines = Vec::new();
@@ -67,6 +72,11 @@ fn inline(value: &Value) -> String {
 mod tests {
     use super::*;
     use serde_json::json;
+
+    #[test]
+    fn one_is_no_plural() {
+        assert_eq!([0, 1, 2].map(|n| counted(n, "sample")), ["0 samples", "1 sample", "2 samples"]);
+    }
 
     #[test]
     fn values_are_aligned_and_nested_ones_indented() {

@@ -20,7 +20,7 @@ impl Imported {
         let places = Arc::make_mut(&mut self.places);
         let before = self.report.entries.len();
         let mut report = |place: &str, element: &str, file: &str| {
-            let (place, element, note) = (place.to_owned(), element.to_owned(), format!("there is no file {file}"));
+            let (place, element, note) = (place.to_owned(), element.to_owned(), format!("no file {file}"));
             self.report.entries.push(ReportEntry {
                 place,
                 element,

@@ -113,7 +113,7 @@ mod tests {
         assert!(report.is_exact());
         report.entries.push(entry("bsdf plastic \"b\"", Outcome::Approximated, "GGX in place of Beckmann"));
         report.entries.push(entry("bsdf plastic \"c\"", Outcome::Approximated, "GGX in place of Beckmann"));
-        report.entries.push(entry("shape hair", Outcome::Ignored, "there are no curves"));
+        report.entries.push(entry("shape hair", Outcome::Ignored, "curves are unsupported"));
         report.entries.push(ReportEntry {
             parameter: String::new(),
             ..entry("shape sdfgrid", Outcome::Ignored, "unsupported shape")
@@ -123,7 +123,7 @@ mod tests {
         assert_eq!((report.count(Outcome::Approximated), report.count(Outcome::Ignored)), (2, 3));
         let expected = [
             "ignored: shape sdfgrid: unsupported shape (s.xml:1:2)",
-            "ignored: shape hair: alpha: there are no curves (s.xml:1:2)",
+            "ignored: shape hair: alpha: curves are unsupported (s.xml:1:2)",
             "approximated: bsdf plastic: alpha: GGX in place of Beckmann (2 times, first at s.xml:1:2)",
         ];
         assert_eq!(report.summary(), expected);

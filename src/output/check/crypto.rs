@@ -87,7 +87,7 @@ pub fn channels(file: &ExrFile) -> Vec<Fault> {
             layers.entry(layer).or_default().insert(suffix.to_lowercase());
         }
         if layers.is_empty() {
-            return Some(format!("there are no channels {name}00.r and so on"));
+            return Some(format!("no channels {name}00.r and so on"));
         }
         if let Some(lost) = (0..layers.len()).find(|layer| !layers.contains_key(layer)) {
             return Some(format!("the layer {name}{lost:02} is missing"));
@@ -130,7 +130,7 @@ pub fn method(file: &ExrFile) -> Vec<Fault> {
 pub fn manifest_there(file: &ExrFile) -> Vec<Fault> {
     each(distinct(file), |matte| {
         let there = ["manifest", "manif_file"].iter().any(|word| matte.entries.contains_key(*word));
-        (!there).then(|| "there is no manifest".to_owned())
+        (!there).then(|| "no manifest".to_owned())
     })
 }
 

@@ -38,7 +38,7 @@ impl ExrFile {
         let malformed = |message: String| Error::Malformed { file: path.into(), message };
         let headers = read_headers(path).map_err(malformed)?;
         if headers.is_empty() {
-            return Err(malformed("there are no parts".into()));
+            return Err(malformed("no parts".into()));
         }
         let mut file = Self { path: path.into(), headers, planes: Vec::new() };
         // Flat files are decoded as a whole, so that a truncated one is not called clean.

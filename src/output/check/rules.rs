@@ -158,7 +158,7 @@ pub const RULES: &[Rule] = &[
         id: "blender-depth",
         title: "A bare Z stands without bare X and Y",
         source: "Blender: openexr_api",
-        effect: "Blender takes Z for a component of a vector: there is no pass Depth",
+        effect: "Blender takes Z for a component of a vector: no pass Depth",
         mend: "put X, Y and Z into a layer",
         severity: BLENDER,
         check: names::depth,

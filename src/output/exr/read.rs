@@ -34,7 +34,7 @@ pub fn read_exr(path: &Path) -> Result<Image> {
         let deep = if headers.iter().any(|header| header.deep) { " (deep data is unsupported)" } else { "" };
         let names: Vec<String> =
             headers.iter().flat_map(|header| &header.channels.list).map(|c| c.name.to_string()).collect();
-        return Err(malformed(format!("there are no channels R, G and B and no Y{deep}; it has {}", names.join(", "))));
+        return Err(malformed(format!("no channels R, G and B and no Y{deep}; it has {}", names.join(", "))));
     };
     let header = &headers[part];
     let (mut requested, mut components) = (Vec::new(), Vec::new());
@@ -96,6 +96,6 @@ pub fn read_settings(path: &Path) -> Result<serde_json::Value> {
         Some(AttributeValue::Text(settings)) => {
             serde_json::from_slice(settings.as_slice()).map_err(|e| malformed(format!("{SETTINGS}: {e}")))
         }
-        _ => Err(malformed(format!("there is no attribute {SETTINGS}: Steradian did not write this file"))),
+        _ => Err(malformed(format!("no attribute {SETTINGS}: Steradian did not write this file"))),
     }
 }

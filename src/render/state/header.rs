@@ -149,7 +149,7 @@ impl Header {
         let [full_width, full_height] = self.film.size.map(u64::from);
         let around = 2 * u64::from(self.film.overscan);
         if !(1..=count).contains(&index) {
-            Some(format!("there is no shard {index} of {count}"))
+            Some(format!("no shard {index} of {count}"))
         } else if self.shard != Shard::WHOLE && self.is_guided() {
             Some("a guided render has no shards".to_owned())
         } else if self.done > self.spp {

@@ -129,7 +129,7 @@ fn guided_state(file: &Path) -> Result<(RenderState, Option<Guide>)> {
 pub(in crate::render) fn read_guide(file: &Path) -> Result<Guide> {
     guided_state(file)?.1.ok_or_else(|| Error::Checkpoint {
         file: file.to_owned(),
-        message: "guiding did not pay in this render and ended: there is no guide; render without --guide".to_owned(),
+        message: "guiding did not pay in this render and ended: no guide; render without --guide".to_owned(),
     })
 }
 

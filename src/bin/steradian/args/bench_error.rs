@@ -92,7 +92,7 @@ pub struct BenchErrorArgs {
     /// Whether paths learn where light comes from: on, off or both
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_switch, help_heading = "Variants")]
     pub guiding: Vec<bool>,
-    /// What finds hits
+    /// Ray accelerator
     #[arg(long, value_name = "LIST", value_delimiter = ',', long_help = accel_help(), help_heading = "Variants")]
     pub accel: Vec<AccelKind>,
     /// Another program, by a command that writes {out}; repeat for several

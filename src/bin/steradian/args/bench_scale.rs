@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use steradian::accel::AccelKind;
+use steradian::bench::scale::SWEEPS;
 
 use super::{accel_help, parse_size};
 
@@ -22,15 +24,15 @@ about 5 minutes of two cores, 3 GB
   steradian bench scale --quick                  Up to 1 million triangles: a minute or two
   steradian bench scale threads --repeat 5       One sweep
 
-Sweeps: resolution, spp, triangles, instances, lights, depth, layers, threads. Every case runs in a process of its \
+Every case runs in a process of its \
 own, so that the most memory it held
 is its own. Ctrl-C ends the case under way and reports what there is.";
 
 /// Arguments of `bench scale`.
 #[derive(Debug, Args)]
 pub struct BenchScaleArgs {
-    /// What shall grow. Default: everything, one after another
-    #[arg(value_name = "SWEEP")]
+    /// The sweeps to run. Default: all, one after another
+    #[arg(value_name = "SWEEP", value_parser = sweeps())]
     pub sweeps: Vec<String>,
     /// Smaller scenes and pictures
     #[arg(long)]
@@ -56,7 +58,7 @@ pub struct BenchScaleArgs {
     /// The most instances. Default: 1e5, 1e4 with --quick
     #[arg(long, value_name = "N", value_parser = parse_count)]
     pub instances: Option<usize>,
-    /// What finds hits
+    /// Ray accelerator
     #[arg(long, value_name = "NAME", default_value = "embree", long_help = accel_help())]
     pub accel: AccelKind,
     /// Folder for scale.html, scale.md, scale.csv and scale.json; without it tables go to stdout
@@ -68,6 +70,11 @@ pub struct BenchScaleArgs {
     /// Print only results and errors
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// The names of all sweeps, each with what it is over.
+fn sweeps() -> PossibleValuesParser {
+    PossibleValuesParser::new(SWEEPS.iter().map(|(name, over)| PossibleValue::new(*name).help(*over)))
 }
 
 fn parse_count(text: &str) -> Result<usize, String> {

@@ -58,8 +58,8 @@ pub struct DenoiseArgs {
     pub input: PathBuf,
     /// The file to write, .exr; #### is replaced by the same number
     pub output: PathBuf,
-    /// Write the denoised picture as .png, too; repeat for several
-    #[arg(short = 'o', long = "png", value_name = "FILE")]
+    /// Further file to write, .png; repeat for several
+    #[arg(short = 'o', long = "output", alias = "png", value_name = "FILE.png")]
     pub also: Vec<PathBuf>,
     /// The layer that holds the albedo: its name before the dot
     #[arg(long, value_name = "LAYER")]

@@ -31,7 +31,7 @@ Examples:
 #[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = "EXR files")]
 pub struct ExrArgs {
-    /// Whom EXR files are made for: names of channels, parts, compression
+    /// EXR profile: channel names, parts and compression for one application
     #[arg(long, value_name = "PROFILE", value_parser = names::plain::<ExrProfileDesc>())]
     pub exr_profile: Option<ExrProfileDesc>,
     /// EXR: compression. dwaa and dwab lose a little, and are only for colour
@@ -52,7 +52,7 @@ pub struct ExrArgs {
     /// EXR: the attribute owner
     #[arg(long, value_name = "TEXT")]
     pub owner: Option<String>,
-    /// EXR: text before the description of layers in the attribute comments
+    /// EXR: text to prepend to the attribute comments
     #[arg(long, value_name = "TEXT")]
     pub comments: Option<String>,
 }
@@ -80,7 +80,7 @@ pub struct CheckExrArgs {
     /// The files to check, of any program
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
-    /// Whom the files are for
+    /// Check against the rules of this profile
     #[arg(long, value_name = "PROFILE", value_parser = names::plain::<ExrProfileDesc>(), default_value = "default")]
     pub profile: ExrProfileDesc,
     /// Warnings count as errors
@@ -103,10 +103,10 @@ pub struct RerenderArgs {
     /// File to write, .exr or .png
     #[arg(short, long, value_name = "OUT")]
     pub output: String,
-    /// The scene, if it does not lie where it did
+    /// The scene file, if it was moved
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<PathBuf>,
-    /// Go on though the scene or its files have changed
+    /// Render even if the scene or its files have changed
     #[arg(long)]
     pub allow_changed: bool,
     /// The checkpoint with the guide of a picture that was rendered with --guide

@@ -31,10 +31,10 @@ pub struct SequenceArgs {
         )
     ]
     pub fps: f64,
-    /// Render frames whose files exist, too; they are skipped otherwise
+    /// Overwrite existing frames; default: skip them
     #[arg(long, requires = "frames", help_heading = "Frames")]
     pub overwrite: bool,
-    /// Go on after a frame that fails; the exit code is that of the first failure
+    /// Continue after a frame that fails; the exit code is that of the first failure
     #[arg(long, requires = "frames", help_heading = "Frames")]
     pub keep_going: bool,
 }

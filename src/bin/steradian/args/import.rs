@@ -19,13 +19,13 @@ pub struct ImportArgs {
     /// glTF: seconds into the animations
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true, help_heading = "Import")]
     pub time: f64,
-    /// Write what became of every parameter as JSON to this file; - for stdout
+    /// Write a report of every imported parameter as JSON to this file; - for stdout
     #[arg(long, value_name = "FILE", help_heading = "Import")]
     pub report: Option<PathBuf>,
-    /// End with exit code 3 if anything of the file was approximated or ignored
+    /// Fail with exit code 3 if anything of the file was approximated or ignored
     #[arg(long, help_heading = "Import")]
     pub strict: bool,
-    /// Go on without the files that are not there: meshes and lights are left out, images are grey
+    /// Render without missing files: meshes and lights are left out, images are grey
     #[arg(long, help_heading = "Import")]
     pub allow_missing: bool,
 }
@@ -40,7 +40,7 @@ impl ImportArgs {
 pub const CONVERT_EXAMPLES: &str = "\
 Examples:
   steradian convert scene.pbrt scene.json          Writes scene.json, and its files into scene_files/
-  steradian convert scene.glb out.json --report -  Reports what became of every parameter
+  steradian convert scene.glb out.json --report -  Reports every parameter
   steradian convert scene.xml out.json --link      Refers to the original meshes and images in place of copying them";
 
 /// Arguments of `convert`.
@@ -58,7 +58,7 @@ pub struct ConvertArgs {
     /// Print only errors
     #[arg(short, long, conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Report what became of every parameter
+    /// Report every parameter
     #[arg(short, long, action = ArgAction::Count)]
     pub verbose: u8,
 }

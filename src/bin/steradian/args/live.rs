@@ -13,8 +13,8 @@ use steradian::render::Settings;
 pub struct LiveArgs {
     /// Send the picture with its layers to the viewer tev as it grows [default: 127.0.0.1:14158]
     ///
-    /// A viewer that is not there, comes later, is slow or ends does not disturb the render; it gets the newest picture
-    /// once it is connected.
+    /// tev may be started, stopped and restarted at any time; it gets the newest picture once it is connected. A slow
+    /// viewer never stalls the render.
     #[
         arg(
             long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = DEFAULT_ADDRESS,
@@ -31,7 +31,7 @@ pub struct LiveArgs {
     /// Serve the page at this address of this machine, such as 0.0.0.0: everyone who reaches it sees the picture
     #[arg(long, value_name = "ADDR", requires = "preview")]
     pub preview_bind: Option<String>,
-    /// Go on serving the page after the render, until Ctrl-C
+    /// Keep serving the page after the render, until Ctrl-C
     #[arg(long, requires = "preview")]
     pub preview_hold: bool,
 }

@@ -7,21 +7,28 @@ use clap::{Args, ValueEnum};
 /// How messages are shown.
 #[derive(Clone, Debug, Default, Args)]
 pub struct LogArgs {
-    /// Messages as text, or as one JSON object a line. Default: text; json with --progress json
-    #[arg(long, global = true, value_name = "FORMAT", help_heading = "Messages")]
+    /// Format of messages. Default: text; json with --progress json
+    #[arg(long, global = true, hide_short_help = true, value_name = "FORMAT", help_heading = "Messages")]
     pub log_format: Option<LogFormat>,
-    /// Also add messages to this file, those of -v too and regardless of --quiet, each with its time
-    #[arg(long, global = true, value_name = "FILE", help_heading = "Messages")]
+    /// Append messages to this file, each with its time; those of -v too, even with --quiet
+    #[arg(long, global = true, hide_short_help = true, value_name = "FILE", help_heading = "Messages")]
     pub log_file: Option<PathBuf>,
-    /// Colours: auto means on a terminal, unless NO_COLOR is set or TERM is dumb, and wherever CLICOLOR_FORCE is set
-    #[arg(long, global = true, value_name = "WHEN", default_value = "auto", help_heading = "Messages")]
+    /// When messages have colours
+    #[arg(
+        long,
+        global = true,
+        hide_short_help = true,
+        value_name = "WHEN",
+        default_value = "auto",
+        help_heading = "Messages"
+    )]
     pub color: ColorChoice,
 }
 
 /// The form of messages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum LogFormat {
-    /// Lines for people.
+    /// Lines of text.
     #[default]
     Text,
     /// One JSON object a line.
@@ -31,10 +38,10 @@ pub enum LogFormat {
 /// When there are colours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum ColorChoice {
-    /// Where they are seen as such.
+    /// On a terminal, unless NO_COLOR is set or TERM is dumb; everywhere if CLICOLOR_FORCE is set.
     #[default]
     Auto,
-    /// Even into files.
+    /// Everywhere, in files too.
     Always,
     /// Nowhere.
     Never,

@@ -15,10 +15,11 @@ mod import;
 mod live;
 mod log;
 mod state;
+mod texts;
 
 use std::path::PathBuf;
 
-use clap::{ArgAction, Args, Parser, Subcommand};
+use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use steradian::accel::AccelKind;
 use steradian::desc::{CausticsDesc, IntegratorDesc, RouletteDesc, SamplerKindDesc, StrategyDesc, ViewDesc};
@@ -26,6 +27,7 @@ use steradian::render::Overrides;
 
 use crate::names::{self, Layers};
 use crate::rerender::Repeat;
+use crate::set::Assignment;
 #[cfg(feature = "bench")]
 pub use bench::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityArgs};
 #[cfg(feature = "bench")]
@@ -41,44 +43,43 @@ pub use import::{ConvertArgs, ImportArgs};
 pub use log::{ColorChoice, LogArgs, LogFormat};
 use state::MERGE_EXAMPLES;
 pub use state::{MergeArgs, StateArgs};
+pub use texts::FIRST_STEPS;
+use texts::{EXAMPLES, RENDER_EXAMPLES, RENDER_SHORT_EXAMPLES};
 
-const EXAMPLES: &str = "\
-Examples:
-  steradian render scene.json                      Writes what the scene's \"outputs\" name
-  steradian render scene.json -o a.exr -o a.png    Writes these instead
-  steradian render scene.xml                       A Mitsuba 3 scene; .pbrt, .gltf and .glb files are read as well
-  steradian convert scene.xml scene.json           The same as a JSON scene, to be edited
-  steradian info scene.json                        What is in the scene
-  steradian compare reference.exr test.exr         How far two pictures differ
+/// Options of `render` that `-h` shows; `--help` shows all.
+const COMMON_OPTIONS: [&str; 21] = [
+    "scene",
+    "output",
+    "spp",
+    "target_error",
+    "size",
+    "crop",
+    "layers",
+    "exposure",
+    "denoise",
+    "integrator",
+    "max_depth",
+    "seed",
+    "accel",
+    "threads",
+    "time_limit",
+    "json",
+    "checkpoint",
+    "resume",
+    "preview",
+    "frames",
+    "overwrite",
+];
 
-Exit codes: 0 done, 1 internal failure, 2 wrong usage, 3 scene invalid, 4 file missing, 5 output not writable, 6 \
-checkpoint or
-shard does not match, 33 out of memory, 130 interrupted and 143 terminated (with checkpoint and picture so far \
-written).";
-
-const RENDER_EXAMPLES: &str = "\
-Examples:
-  steradian render cornell.json --spp 1024 -o cornell.exr
-      1024 samples per pixel into a linear multi-layer EXR.
-  steradian render cornell.json --time-limit 60 --size 1920x1080 -o a.exr -o a.png
-      The best picture a minute can give, as EXR and as PNG.
-  steradian render cornell.json --crop 200,100,64,64 --spp 4096
-      A close look at one part; each pixel is the same as in the whole picture.
-  steradian render cornell.json --integrator ambient_occlusion --spp 16
-      The geometry without materials and lights.
-  steradian render cornell.json --layers Z,N,albedo --float -o cornell.exr
-      Depth, normals and albedo beside the picture, everything in 32 bits.
-  steradian render cornell.json --spp 4096 --checkpoint cornell.state --resume
-      Whatever ends the render, the same line continues it; a larger --spp adds samples.
-  steradian render cornell.json --shard 2/8
-      An eighth of the samples into cornell.2-of-8.shard, for steradian merge.
-  steradian render cornell.json --pixel 120,80 --sample 7
-      The values of exactly one sample; nothing is written.
-  steradian render cornell.json -q --json - | jq .mrays_per_second
-      Statistics for scripts.
-
-Without -o and without \"outputs\" in the scene, SCENE.exr and SCENE.png are written to the working directory.
-Ctrl-C finishes the samples under way and writes the picture; a second one leaves at once.";
+/// The command line as it is parsed: the options that few need are absent from `-h`.
+pub fn command_line() -> clap::Command {
+    Cli::command().mut_subcommand("render", |render| {
+        render.mut_args(|arg| {
+            let is_common = ["quiet", "verbose", "help"].iter().chain(&COMMON_OPTIONS).any(|id| arg.get_id() == *id);
+            arg.hide_short_help(!is_common)
+        })
+    })
+}
 
 /// A fast, accurate CPU renderer.
 #[derive(Debug, Parser)]
@@ -95,12 +96,13 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Render a scene to files
-    #[command(after_help = RENDER_EXAMPLES)]
+    #[command(after_help = RENDER_SHORT_EXAMPLES, after_long_help = RENDER_EXAMPLES)]
     Render(Box<RenderArgs>),
-    /// Print what is in a scene
+    /// Check a scene and print what is in it and what it will cost
     ///
-    /// Loads the scene with everything it names and prints counts, bounds, memory and features. A scene that has info
-    /// without an error renders without an error.
+    /// Loads the scene with everything it names and prints size, samples, camera, bounds, counts, features, the number
+    /// of camera rays and the memory of geometry and film. A scene that has info without an error renders without an
+    /// error.
     Info(InfoArgs),
     /// Turn a scene of another renderer into the JSON format, with its meshes and images beside it
     #[command(after_help = import::CONVERT_EXAMPLES)]
@@ -118,7 +120,7 @@ pub enum Command {
     Merge(MergeArgs),
     /// Check EXR files against what the programs that read them expect
     ///
-    /// Names every rule that a file breaks, what reads it wrongly, and how to mend it. docs/exr.md lists the rules.
+    /// Names every rule that a file breaks, what reads it wrongly, and how to fix it. docs/exr.md lists the rules.
     #[command(after_help = exr::CHECK_EXAMPLES)]
     CheckExr(CheckExrArgs),
     /// Render the picture of an EXR file again
@@ -127,6 +129,11 @@ pub enum Command {
     /// changed is an error that names it. No other path or address in the file is loaded, written or connected to.
     #[command(after_help = exr::RERENDER_EXAMPLES)]
     Rerender(RerenderArgs),
+    /// Print the values of one sample of one pixel
+    ///
+    /// The sample is computed as the render with the same options computes it, bit for bit; nothing is written.
+    #[command(after_help = "Example:\n  steradian replay cornell.json 120,80 7 --integrator whitted")]
+    Replay(ReplayArgs),
     /// Compare a picture with its reference
     ///
     /// Both are EXR files; the linear colour is compared. mse is the mean of (test - reference)², relmse that of
@@ -140,7 +147,7 @@ pub enum Command {
     /// Denoise an EXR file with Intel Open Image Denoise
     #[command(long_about = denoise::ABOUT, after_help = denoise::EXAMPLES)]
     Denoise(DenoiseArgs),
-    /// Measure
+    /// Measure speed, error, scaling and numerical stability
     #[cfg(feature = "bench")]
     #[command(subcommand)]
     Bench(BenchCommand),
@@ -183,7 +190,7 @@ pub struct RenderArgs {
     pub output: Vec<String>,
 
     /// Samples per pixel
-    #[arg(long, value_name = "N", help_heading = "Picture")]
+    #[arg(short = 's', long, value_name = "N", help_heading = "Picture")]
     pub spp: Option<u32>,
     /// Render until the picture's relative squared error is below this, with samples where they are needed
     ///
@@ -226,7 +233,7 @@ pub struct RenderArgs {
     /// Largest number of segments from the camera; 1 shows only directly visible light
     #[arg(long, value_name = "N", help_heading = "Algorithm")]
     pub max_depth: Option<u32>,
-    /// How directions towards lights are found
+    /// Light sampling: by lights, by materials, or both weighted by multiple importance sampling
     #[arg(long, value_name = "NAME", value_parser = names::plain::<StrategyDesc>(), help_heading = "Algorithm")]
     pub strategy: Option<StrategyDesc>,
     /// Russian roulette: auto, throughput or off
@@ -250,14 +257,22 @@ pub struct RenderArgs {
     /// Not with --guiding, --guide, --target-error or --regularize. Default: paths
     #[arg(long, value_name = "NAME", value_parser = names::plain::<CausticsDesc>(), help_heading = "Algorithm")]
     pub caustics: Option<CausticsDesc>,
-    /// Path guiding: sample directions by the incident radiance learned from earlier paths: on or off
+    /// Path guiding: sample directions by the incident radiance learned from earlier paths
     ///
     /// For scenes whose light comes by few ways, such as through a door ajar. Iterations double; each is guided by the
     /// samples of those before, and weighted by its inverse variance. Guiding ends where it does not pay. With
     /// --checkpoint and --resume the picture is the same bit for bit. Unsupported with --shard: each part would have to
     /// render nearly all samples to train the guide; --guide uses a trained one.
-    #[arg(long, value_name = "SWITCH", value_parser = parse_switch, help_heading = "Algorithm")]
+    #[
+        arg(
+            long, value_name = "on|off", num_args = 0..=1, default_missing_value = "on", value_parser = parse_switch,
+            help_heading = "Algorithm"
+        )
+    ]
     pub guiding: Option<bool>,
+    /// Do not guide paths, whatever the scene sets
+    #[arg(long, conflicts_with = "guiding", help_heading = "Algorithm")]
+    pub no_guiding: bool,
     /// Guide paths by what another render has learned: the --checkpoint of one with --guiding on
     ///
     /// The guide is not trained further, whatever --guiding says. Samples then depend on it alone, so that --shard,
@@ -266,10 +281,16 @@ pub struct RenderArgs {
     /// alike the light is.
     #[arg(long, value_name = "FILE", help_heading = "Algorithm")]
     pub guide: Option<PathBuf>,
-    /// How samples are chosen
+    /// Set a key of the scene's film, sampler or integrator, such as integrator.clamp=10; repeat for several
+    ///
+    /// Keys and values are those of the scene format (`steradian schema`). The picture's EXR file holds them, for
+    /// `steradian rerender`. Options of their own, such as --spp, take precedence.
+    #[arg(long, value_name = "KEY=VALUE", help_heading = "Algorithm")]
+    pub set: Vec<Assignment>,
+    /// Sampler: how samples are chosen
     #[arg(long, value_name = "NAME", value_parser = names::plain::<SamplerKindDesc>(), help_heading = "Algorithm")]
     pub sampler: Option<SamplerKindDesc>,
-    /// A different seed gives different noise
+    /// Seed of the noise
     #[arg(long, value_name = "N", help_heading = "Algorithm")]
     pub seed: Option<u64>,
     /// Render everything in focus, as if the camera had no lens
@@ -278,24 +299,24 @@ pub struct RenderArgs {
     /// Do not show the background to the camera: alpha is 0 there
     #[arg(long, help_heading = "Picture")]
     pub transparent: bool,
-    /// What finds hits: embree, bvh, kdtree, octree or linear, with options such as embree:high
+    /// Ray accelerator: auto, embree, packets, bvh, kdtree, octree or linear, with options such as embree:high
     #[arg(long, value_name = "NAME", long_help = accel_help(), help_heading = "Algorithm")]
     pub accel: Option<AccelKind>,
 
     /// Number of threads; 0 means all. The picture does not depend on it
-    #[arg(long, value_name = "N", help_heading = "Run")]
+    #[arg(short = 't', long, value_name = "N", help_heading = "Run")]
     pub threads: Option<usize>,
-    /// End after this time even if samples are missing
+    /// Stop after this time, with the samples so far
     #[arg(long, value_name = "SECONDS", help_heading = "Run")]
     pub time_limit: Option<f64>,
     /// Write statistics as JSON to this file; - for stdout
     #[arg(long, value_name = "STATS", help_heading = "Run")]
     pub json: Option<PathBuf>,
     /// Replay samples of this pixel alone and print their values; nothing is written
-    #[arg(long, value_name = "X,Y", value_parser = parse_list::<u32, 2>, requires = "sample", help_heading = "Run")]
+    #[arg(long, value_name = "X,Y", value_parser = parse_list::<u32, 2>, requires = "sample", hide = true)]
     pub pixel: Option<[u32; 2]>,
     /// The sample to replay, counted from 0
-    #[arg(long, value_name = "I", requires = "pixel", help_heading = "Run")]
+    #[arg(long, value_name = "I", requires = "pixel", hide = true)]
     pub sample: Option<u32>,
     #[command(flatten)]
     pub exr: ExrArgs,
@@ -339,6 +360,22 @@ pub struct InfoArgs {
     pub import: ImportArgs,
     #[command(flatten)]
     pub verbosity: Verbosity,
+}
+
+/// Arguments of `replay`, which is `render` with `--pixel` and `--sample`.
+#[derive(Debug, Args)]
+pub struct ReplayArgs {
+    /// The scene file
+    pub scene: PathBuf,
+    /// The pixel, from the upper left corner
+    #[arg(value_name = "X,Y")]
+    pub pixel: String,
+    /// The sample, counted from 0
+    #[arg(value_name = "I")]
+    pub sample: u32,
+    /// Options of the render, as of `steradian render`
+    #[arg(value_name = "OPTIONS", trailing_var_arg = true, allow_hyphen_values = true)]
+    pub options: Vec<String>,
 }
 
 /// Arguments of `compare`.
@@ -397,7 +434,7 @@ impl RenderArgs {
             clamp: self.clamp,
             regularize: self.regularize,
             caustics: self.caustics,
-            guiding: self.guiding,
+            guiding: if self.no_guiding { Some(false) } else { self.guiding },
             guide: None,
             time_limit: self.time_limit,
             outputs: self.output.clone(),
@@ -438,7 +475,7 @@ fn accel_help() -> String {
     let line = |(name, what): &(&str, &str)| format!("  {name:<16}{what}");
     let lines: Vec<_> = AccelKind::CHOICES.iter().map(line).collect();
     format!(
-        "What finds hits; all give the same picture within rounding. Options combine, as in embree:low+compact\n\n{}",
+        "Ray accelerator; all give the same picture within rounding. Options combine, as in embree:low+compact\n\n{}",
         lines.join("\n")
     )
 }

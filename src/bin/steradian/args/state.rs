@@ -11,9 +11,9 @@ Examples:
   steradian merge cornell.*-of-8.shard -o cornell.exr
       The picture of all eight.
   steradian merge cornell.*-of-8.shard -o cornell.exr --partial
-      The picture of those that are there.
+      The picture of the shards that exist.
   steradian merge cornell.state -o now.exr --partial
-      How far a render is, from its checkpoint.";
+      The picture of a render so far, from its checkpoint.";
 
 /// Where the state of a render is kept, and which samples belong to it.
 #[derive(Clone, Debug, Args)]
@@ -55,7 +55,7 @@ pub struct MergeArgs {
     /// File to write, .exr or .png; repeat for several. Without it, what the render would have written
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<String>,
-    /// Merge what is there though shards or samples are missing; an EXR lists them in its attribute steradian/partial
+    /// Merge even if shards or samples are missing; an EXR lists them in its attribute steradian/partial
     #[arg(long)]
     pub partial: bool,
     /// Print only errors

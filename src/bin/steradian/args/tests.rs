@@ -80,3 +80,17 @@ fn wrong_options_are_refused() {
     let message = render(&["--integrator", "pathh"]).unwrap_err().to_string();
     assert!(message.contains("ambient_occlusion") && message.contains("'path'"), "{message}");
 }
+
+#[test]
+fn guiding_is_a_switch() {
+    let guiding = |line: &str| {
+        render(&line.split_whitespace().collect::<Vec<_>>()).map(|arguments| arguments.overrides(Vec::new()).guiding)
+    };
+    assert_eq!(guiding("").unwrap(), None);
+    assert_eq!(guiding("--guiding").unwrap(), Some(true));
+    assert_eq!(guiding("--guiding -q").unwrap(), Some(true));
+    assert_eq!(guiding("--guiding on").unwrap(), Some(true));
+    assert_eq!(guiding("--guiding off").unwrap(), Some(false));
+    assert_eq!(guiding("--no-guiding").unwrap(), Some(false));
+    assert!(guiding("--guiding --no-guiding").is_err() && guiding("--guiding maybe").is_err());
+}

@@ -2,6 +2,7 @@
 //! the machine's limits.
 
 mod files;
+mod hints;
 mod show;
 
 use std::ffi::OsString;
@@ -14,7 +15,7 @@ use steradian::farm::message_lines;
 use steradian::suggestion::did_you_mean;
 use steradian::{Error, Result};
 
-use crate::args::Cli;
+use crate::args::{Cli, FIRST_STEPS, command_line};
 use crate::log;
 pub use show::run as show;
 
@@ -67,7 +68,12 @@ pub struct Parsed {
 pub fn parse() -> Result<Parsed> {
     let line: Vec<OsString> = std::env::args_os().collect();
     check_utf8(&line)?;
-    let command = color(Cli::command(), &line);
+    let line = with_replay(line);
+    if line.len() == 1 {
+        log::line(FIRST_STEPS);
+        std::process::exit(2);
+    }
+    let command = color(command_line(), &line);
     let matches = command.clone().try_get_matches_from(&line).unwrap_or_else(|error| exit(&error));
     let Some(("render", render)) = matches.subcommand() else {
         return Ok(Parsed { cli: typed(&matches), warnings: Vec::new(), added: Vec::new(), files: Vec::new() });
@@ -93,11 +99,30 @@ pub fn parse() -> Result<Parsed> {
 fn exit(error: &clap::Error) -> ! {
     let text = error.to_string();
     let harmless = message_lines(&text);
-    if !error.use_stderr() || harmless == text {
+    if !error.use_stderr() {
         error.exit();
     }
-    log::line(harmless.trim_end());
+    if harmless == text {
+        // Stderr may be gone; that is no reason to stop.
+        let _ = error.print();
+    } else {
+        log::line(harmless.trim_end());
+    }
+    if let Some(hint) = hints::hint(error) {
+        log::line(&message_lines(&format!("\n{hint}")));
+    }
     std::process::exit(error.exit_code());
+}
+
+/// `replay SCENE X,Y I` as `render SCENE --pixel X,Y --sample I`, with the same options.
+fn with_replay(line: Vec<OsString>) -> Vec<OsString> {
+    let words: Vec<&str> = line.iter().filter_map(|word| word.to_str()).collect();
+    let [program, "replay", scene, pixel, sample, options @ ..] = &words[..] else { return line };
+    if [scene, pixel, sample].iter().any(|word| word.starts_with('-')) {
+        return line;
+    }
+    let render = [program, "render", scene, "--pixel", pixel, "--sample", sample];
+    render.iter().chain(options).map(OsString::from).collect()
 }
 
 /// Names go into files whose text is UTF-8: pictures, statistics, states.

@@ -109,7 +109,7 @@ impl<'a> GltfSource<'a> {
         types: &[Type],
         accessor_use: AccessorUse,
     ) -> Result<Column<'a>, String> {
-        let accessor = self.root.get(index).ok_or("there is no such accessor")?;
+        let accessor = self.root.get(index).ok_or("no such accessor")?;
         let (Checked::Valid(kind), Checked::Valid(type_)) = (accessor.component_type, accessor.type_) else {
             return Err("the type is not one of glTF".into());
         };
@@ -161,7 +161,7 @@ impl<'a> GltfSource<'a> {
         count: usize,
         size: usize,
     ) -> Result<(Option<&'a [u8]>, usize), String> {
-        let json = self.root.buffer_views.get(view).ok_or("there is no such view")?;
+        let json = self.root.buffer_views.get(view).ok_or("no such view")?;
         let view_of = self.buffers.view(json).map_err(|message| format!("bufferViews[{view}]: {message}"))?;
         let stride = view_of.stride.unwrap_or(size);
         if stride < size {

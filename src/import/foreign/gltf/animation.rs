@@ -38,8 +38,7 @@ pub fn evaluate(source: GltfSource, time: f64, draft: &mut Draft) -> Result<Moti
                 continue;
             }
             let sampler = animation.samplers.get(channel.sampler.value());
-            let sampler =
-                sampler.ok_or_else(|| source.fault(&format!("{path}.sampler"), "there is no such sampler"))?;
+            let sampler = sampler.ok_or_else(|| source.fault(&format!("{path}.sampler"), "no such sampler"))?;
             let curve = Curve::new(source, &path, sampler, value_type(property))?;
             motion.set(node, property, &curve, time).ok_or_else(|| source.fault(&path, "does not give a rotation"))?;
             draft.mapped(&path, &element, "channel");

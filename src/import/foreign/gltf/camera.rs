@@ -30,7 +30,7 @@ pub fn add(source: GltfSource, tree: &Tree, pose: &Pose, draft: &mut Draft) -> R
         }
         found = true;
         let place = format!("cameras[{}]", index.value());
-        let camera = source.root.get(index).ok_or_else(|| source.fault(&path, "there is no such camera"))?;
+        let camera = source.root.get(index).ok_or_else(|| source.fault(&path, "no such camera"))?;
         let mut desc = lens(source, &place, camera, draft)?;
         let upright = upright(&pose.world[i]).ok_or_else(|| source.fault(&path, "the camera is scaled to nothing"))?;
         desc.transform = Some(transform(&upright));

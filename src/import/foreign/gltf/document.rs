@@ -51,7 +51,7 @@ struct Asset {
     min_version: Option<String>,
 }
 
-const NO_ELEMENT: &str = "there is no element of this index";
+const NO_ELEMENT: &str = "no element of this index";
 
 /// Splits and parses the bytes of a file.
 pub fn parse<'a>(file: &Path, bytes: &'a [u8]) -> Result<Document<'a>> {
@@ -148,7 +148,7 @@ fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
         }
         at += 8 + chunk.len();
     }
-    Ok((json.ok_or("there is no JSON chunk")?, bin))
+    Ok((json.ok_or("no JSON chunk")?, bin))
 }
 
 /// Reports which extensions of the file are not read.

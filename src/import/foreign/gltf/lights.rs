@@ -20,9 +20,8 @@ pub fn add(source: GltfSource, tree: &Tree, pose: &Pose, draft: &mut Draft) -> R
         let extensions = node.extensions.as_ref().map(|extensions| &extensions.others);
         let Some(index) = source.extension::<LightIndex>(&path, extensions, NAME)? else { continue };
         let light = lights.lights.get(index.light);
-        let light = light.ok_or_else(|| {
-            source.fault(&format!("{path}.extensions.{NAME}"), format!("there is no light {}", index.light))
-        })?;
+        let light = light
+            .ok_or_else(|| source.fault(&format!("{path}.extensions.{NAME}"), format!("no light {}", index.light)))?;
         if !found {
             let how =
                 "1 candela is taken for 1 W/sr, 1 lux for 1 W/m², and 1 nit of what surfaces give off for 1 W/(sr m²)";

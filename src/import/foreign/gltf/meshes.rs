@@ -103,8 +103,7 @@ pub fn add(source: GltfSource, tree: &Tree, pose: &Pose, draft: &mut Draft) -> R
 fn form(source: GltfSource, node: usize, mesh: Index<Mesh>, pose: &Pose) -> Result<Form> {
     let (index, json) = (mesh.value(), source.root.nodes.get(node));
     let targets = |primitive: &Primitive| primitive.targets.as_ref().map_or(0, Vec::len);
-    let mesh =
-        source.root.get(mesh).ok_or_else(|| source.fault(&format!("nodes[{node}].mesh"), "there is no such mesh"))?;
+    let mesh = source.root.get(mesh).ok_or_else(|| source.fault(&format!("nodes[{node}].mesh"), "no such mesh"))?;
     let count = mesh.primitives.iter().map(targets).max().unwrap_or(0);
     let given = pose
         .weights
@@ -137,7 +136,7 @@ fn placements(
     let column = |name: &str, type_: Type| match instancing.attributes.get(name) {
         Some(&index) => {
             let place = format!("{path}.extensions.{NAME}.attributes.{name}");
-            let index = u32::try_from(index).map_err(|_| source.fault(&place, "there is no such accessor"))?;
+            let index = u32::try_from(index).map_err(|_| source.fault(&place, "no such accessor"))?;
             source.column(&place, Index::new(index), &[type_], AccessorUse::Floats).map(Some)
         }
         None => Ok(None),
@@ -209,7 +208,7 @@ impl Builder<'_, '_> {
                 path,
                 "primitive",
                 "TEXCOORD",
-                "there is no uv for the textures: they show the colour of one corner",
+                "no uv for the textures: they show the colour of one corner",
             );
             data.uvs = Some(vec![[0.0, 1.0]; data.positions.len()]);
         }

@@ -45,7 +45,7 @@ impl Tree {
                         ));
                     }
                     Some(parent) => *parent = Some(i),
-                    None => return Err(source.fault(&place, "there is no such node")),
+                    None => return Err(source.fault(&place, "no such node")),
                 }
             }
         }
@@ -91,7 +91,7 @@ fn shown_roots(
     let scenes = &source.root.scenes;
     let chosen = source.root.scene.map_or(0, |index| index.value());
     let Some(scene) = scenes.get(chosen) else {
-        draft.approximated("scenes", "file", "scenes", "there is no scene: all nodes are shown");
+        draft.approximated("scenes", "file", "scenes", "no scene: all nodes are shown");
         return Ok(roots);
     };
     for (i, _) in scenes.iter().enumerate().filter(|(i, _)| *i != chosen) {

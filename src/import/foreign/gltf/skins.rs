@@ -13,7 +13,7 @@ use crate::math::{DAffine3, DMat3, DVec3};
 /// World from mesh by each joint of a skin.
 pub fn joints(source: GltfSource, index: Index<Skin>, pose: &Pose) -> Result<Vec<DAffine3>> {
     let path = format!("skins[{}]", index.value());
-    let skin = source.root.get(index).ok_or_else(|| source.fault(&path, "there is no such skin"))?;
+    let skin = source.root.get(index).ok_or_else(|| source.fault(&path, "no such skin"))?;
     let binds = match skin.inverse_bind_matrices {
         Some(accessor) => {
             Some(source.column(&format!("{path}.inverseBindMatrices"), accessor, &[Type::Mat4], AccessorUse::Floats)?)
@@ -26,7 +26,7 @@ pub fn joints(source: GltfSource, index: Index<Skin>, pose: &Pose) -> Result<Vec
     let mut joints = Vec::with_capacity(skin.joints.len());
     for (k, joint) in skin.joints.iter().enumerate() {
         let place = format!("{path}.joints[{k}]");
-        let world = pose.world.get(joint.value()).ok_or_else(|| source.fault(&place, "there is no such node"))?;
+        let world = pose.world.get(joint.value()).ok_or_else(|| source.fault(&place, "no such node"))?;
         let bind = binds.as_ref().map_or(DAffine3::IDENTITY, |binds| {
             let m = binds.floats::<16>(k).map(f64::from);
             let column = |i: usize| DVec3::new(m[i], m[i + 1], m[i + 2]);

@@ -71,8 +71,7 @@ impl TextureSet {
         channel: Option<ChannelDesc>,
     ) -> Result<Option<String>> {
         let json = source.root.textures.get(texture.index);
-        let json =
-            json.ok_or_else(|| source.fault(&texture.place, format!("there is no textures[{}]", texture.index)))?;
+        let json = json.ok_or_else(|| source.fault(&texture.place, format!("no textures[{}]", texture.index)))?;
         let path = format!("textures[{}]", texture.index);
         // An index of all ones means none.
         let Some(image) = source.root.images.get(json.source.value()).map(|_| json.source.value()) else {
@@ -140,14 +139,14 @@ enum Location {
 
 fn location(source: GltfSource, index: usize) -> Result<Location> {
     let path = format!("images[{index}]");
-    let image = source.root.images.get(index).ok_or_else(|| source.fault(&path, "there is no such image"))?;
+    let image = source.root.images.get(index).ok_or_else(|| source.fault(&path, "no such image"))?;
     match (&image.uri, image.buffer_view) {
         (Some(uri), _) => match Uri::parse(uri).map_err(|message| source.fault(&path, message))? {
             Uri::File(file) => Ok(Location::File(file)),
             Uri::Data(bytes) => Ok(Location::Bytes(bytes)),
         },
         (None, Some(view)) => {
-            let json = source.root.get(view).ok_or_else(|| source.fault(&path, "there is no such view"))?;
+            let json = source.root.get(view).ok_or_else(|| source.fault(&path, "no such view"))?;
             let view = source.buffers.view(json).map_err(|message| source.fault(&path, message))?;
             Ok(Location::Bytes(view.bytes.to_vec()))
         }

@@ -37,7 +37,7 @@ fn parse(bytes: &[u8], index: u32) -> Result<MeshData, String> {
     let count_at = bytes.len().checked_sub(4).ok_or_else(short)?;
     let count = number(bytes, count_at, 4).ok_or_else(short)?;
     if u64::from(index) >= count {
-        return Err(format!("the file has {count} meshes: there is no index {index}"));
+        return Err(format!("the file has {count} meshes: no index {index}"));
     }
     // Offsets of all meshes stand before their number.
     let width = if version >= 4 { 8 } else { 4 };

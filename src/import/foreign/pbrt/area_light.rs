@@ -33,7 +33,7 @@ impl AreaLight {
     /// Reads the directive. `exposure` is the film's.
     pub fn read(draft: &mut Draft, kind: &str, params: &Params, colors: &Colors, exposure: f64) -> Result<Self> {
         if kind != "diffuse" {
-            return Err(params.error(format!("there is no area light \"{kind}\"")));
+            return Err(params.error(format!("unknown area light \"{kind}\"")));
         }
         let color = colors.get(params, "L", Meaning::Emission)?.unwrap_or([1.0; 3]);
         let scale = (params.number_or("scale", 1.0)? * exposure) as f32;

@@ -141,7 +141,7 @@ fn set_projection(
                 params.ignore(name, "lens systems are not known");
             }
         }
-        other => return Err(params.error(format!("there is no camera \"{other}\""))),
+        other => return Err(params.error(format!("unknown camera \"{other}\""))),
     }
     Ok(())
 }

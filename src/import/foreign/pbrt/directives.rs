@@ -118,7 +118,7 @@ impl Reader {
                 return Err(lexer.error(at, "the file ends within an attribute, transform or object block"));
             }
             if !self.in_world {
-                return Err(lexer.error(at, "there is no WorldBegin"));
+                return Err(lexer.error(at, "no WorldBegin"));
             }
         }
         self.media.finish(&mut self.draft);
@@ -181,7 +181,7 @@ impl Reader {
                 let name = quoted(lexer, at, "a colour space")?;
                 let space = ColorSpace::named(&name);
                 self.graphics.color_space =
-                    space.ok_or_else(|| lexer.error(at, format!("there is no colour space \"{name}\"")))?;
+                    space.ok_or_else(|| lexer.error(at, format!("unknown colour space \"{name}\"")))?;
             }
             _ => return Ok(false),
         }
@@ -236,7 +236,7 @@ impl Reader {
                 self.graphics.area_light = Some(Rc::new(light));
             }
             "Shape" => self.shape(lexer, at)?,
-            other => return Err(lexer.error(at, format!("there is no directive \"{other}\""))),
+            other => return Err(lexer.error(at, format!("unknown directive \"{other}\""))),
         }
         Ok(None)
     }

@@ -82,10 +82,10 @@ impl Lights<'_> {
             }
             "infinite" => LightDesc::Environment(self.environment(draft, params, &map.matrix3)?),
             "projection" => {
-                draft.ignored(&params.place, &params.element, "", "there are no projection lights");
+                draft.ignored(&params.place, &params.element, "", "projection lights are unsupported");
                 return Ok(());
             }
-            other => return Err(params.error(format!("there is no light \"{other}\""))),
+            other => return Err(params.error(format!("unknown light \"{other}\""))),
         };
         params.report(draft);
         draft.add_light(&params.place, light);

@@ -74,7 +74,7 @@ impl Materials<'_> {
                 self.draft.approximated(&params.place, &params.element, "", "diffuse of 0.5");
                 MaterialDesc::Diffuse { albedo: ColorDesc::Grey(0.5), roughness: zero() }
             }
-            other => return Err(params.error(format!("there is no material \"{other}\""))),
+            other => return Err(params.error(format!("unknown material \"{other}\""))),
         })
     }
 

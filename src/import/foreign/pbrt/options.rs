@@ -119,7 +119,7 @@ pub fn set_filter(draft: &mut Draft, filter: Option<&Typed>) -> Result<()> {
             }
             FilterDesc::Mitchell { radius: 2.0, b: 1.0 / 3.0, c: 1.0 / 3.0, samples: None }
         }
-        other => return Err(params.error(format!("there is no pixel filter \"{other}\""))),
+        other => return Err(params.error(format!("unknown pixel filter \"{other}\""))),
     };
     params.report(draft);
     Ok(())

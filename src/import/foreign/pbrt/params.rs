@@ -284,7 +284,7 @@ fn read_values(lexer: &mut Lexer, declaration: &Token, kind: &str) -> Result<Val
         // Of a spectrum: numbers, or the name of one, depending on the first value.
         "spectrum" | "integer" | "float" | "point2" | "point3" | "point" | "vector2" | "vector3" | "vector"
         | "normal" | "normal3" | "rgb" | "blackbody" => Values::Numbers(Vec::new()),
-        _ => return Err(lexer.error(declaration.at, format!("there is no type of parameters \"{kind}\""))),
+        _ => return Err(lexer.error(declaration.at, format!("unknown type of parameters \"{kind}\""))),
     };
     let open = lexer.peek()?.is_some_and(|token| token.kind == TokenKind::Open);
     if open {

@@ -216,10 +216,10 @@ impl Shapes<'_> {
                 loop_subdivision::subdivide(&positions, &indices, levels).map_err(|message| params.error(message))?
             }
             "curve" => {
-                draft.ignored(&params.place, &params.element, "", "there are no curves");
+                draft.ignored(&params.place, &params.element, "", "curves are unsupported");
                 return Ok(None);
             }
-            other => return Err(params.error(format!("there is no shape \"{other}\""))),
+            other => return Err(params.error(format!("unknown shape \"{other}\""))),
         };
         let mut mesh = mesh;
         if mesh.triangles.is_empty() {

@@ -182,7 +182,7 @@ impl Textures {
                 draft.approximated(&params.place, &params.element, "", "the same grey of 0.5 everywhere");
                 Texture::grey(0.5)
             }
-            other => return Err(params.error(format!("there is no texture \"{other}\""))),
+            other => return Err(params.error(format!("unknown texture \"{other}\""))),
         };
         params.report(draft);
         let known = if of_numbers { &mut self.numbers } else { &mut self.colors };

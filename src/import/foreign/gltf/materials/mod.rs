@@ -74,7 +74,7 @@ impl MaterialSet {
         let default = Material::default();
         let path = index.map_or_else(|| "materials".into(), |index| format!("materials[{}]", index.value()));
         let json = match index {
-            Some(index) => source.root.get(index).ok_or_else(|| source.fault(&path, "there is no such material"))?,
+            Some(index) => source.root.get(index).ok_or_else(|| source.fault(&path, "no such material"))?,
             None => &default,
         };
         // Light cannot have colours of vertices.

@@ -327,7 +327,7 @@ fn broken_images_and_indices_are_errors() {
         "clearcoatFactor": 1, "clearcoatTexture": { "index": 7 } } } });
     let message = asset.try_read().unwrap_err().to_string();
     assert!(
-        message.contains("materials[0].extensions.KHR_materials_clearcoat.clearcoatTexture: there is no textures[7]"),
+        message.contains("materials[0].extensions.KHR_materials_clearcoat.clearcoatTexture: no textures[7]"),
         "{message}"
     );
 }

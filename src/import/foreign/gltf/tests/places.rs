@@ -165,5 +165,5 @@ fn lights_shine_along_minus_z_by_their_units() {
     assert_eq!(outcome(&imported, "range"), Some(Outcome::Ignored));
 
     asset.json["nodes"][0]["extensions"]["KHR_lights_punctual"]["light"] = json!(3);
-    assert!(asset.try_read().unwrap_err().to_string().contains("there is no light 3"));
+    assert!(asset.try_read().unwrap_err().to_string().contains("no light 3"));
 }

@@ -1,5 +1,11 @@
 //! What the user may have meant by a name that does not exist.
 
+mod synonyms;
+
+use synonyms::synonym;
+#[cfg(test)]
+pub use synonyms::targets;
+
 /// Longer names, in characters, are compared with none: that would take the square of their length.
 const MAX_NAME: usize = 128;
 
@@ -7,9 +13,11 @@ const MAX_NAME: usize = 128;
 const MAX_CANDIDATES: usize = 10_000;
 
 /// The end of a message about `name`: ` (did you mean NEAR?)` with the nearest candidate between `quotes`, or nothing
-/// if none is near.
+/// if none is near. The candidate for a word of another program is the one that stands for it here.
 pub fn did_you_mean<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>, [open, close]: [&str; 2]) -> String {
-    closest_name(name, candidates).map_or(String::new(), |near| format!(" (did you mean {open}{near}{close}?)"))
+    let candidates: Vec<&str> = candidates.into_iter().collect();
+    let near = synonym(name, &candidates).or_else(|| closest_name(name, candidates));
+    near.map_or(String::new(), |near| format!(" (did you mean {open}{near}{close}?)"))
 }
 
 /// The candidate that `name` is most likely a slip of, if any is near.

@@ -1,0 +1,92 @@
+//! Hints for command lines of other programs, and of those who forget a word.
+
+use std::path::Path;
+
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+
+/// Options of other renderers, and what they are here.
+const OPTIONS: [(&str, &str); 27] = [
+    ("--samples", "--spp N"),
+    ("--samples-per-pixel", "--spp N"),
+    ("--quality", "--spp N, or --target-error"),
+    ("--noise", "--target-error"),
+    ("--noise-threshold", "--target-error"),
+    ("--resolution", "--size WxH"),
+    ("--res", "--size WxH"),
+    ("--width", "--size WxH"),
+    ("--height", "--size WxH"),
+    ("--scale", "--size WxH"),
+    ("--outfile", "-o FILE"),
+    ("--out", "-o FILE"),
+    ("--render-output", "-o FILE"),
+    ("--format", "the extension of -o FILE: .exr or .png"),
+    ("--nthreads", "--threads N"),
+    ("--jobs", "--threads N"),
+    ("--cores", "--threads N"),
+    ("--bounces", "--max-depth N"),
+    ("--depth", "--max-depth N"),
+    ("--cropwindow", "--crop X,Y,W,H, in pixels"),
+    ("--region", "--crop X,Y,W,H, in pixels"),
+    ("--aov", "--layers LAYERS"),
+    ("--aovs", "--layers LAYERS"),
+    ("--timeout", "--time-limit SECONDS"),
+    ("--max-time", "--time-limit SECONDS"),
+    ("--force", "--overwrite, with --frames; single files are always overwritten"),
+    ("--spectral", "unsupported: Steradian renders in linear RGB"),
+];
+
+/// What a faulty command line may have been meant to be.
+pub fn hint(error: &clap::Error) -> Option<String> {
+    let given = |kind: ContextKind| match error.get(kind)? {
+        ContextValue::String(text) => Some(text.as_str()),
+        _ => None,
+    };
+    match error.kind() {
+        ErrorKind::InvalidSubcommand => {
+            let word = given(ContextKind::InvalidSubcommand)?;
+            let extension = Path::new(word).extension()?.to_str()?.to_lowercase();
+            match extension.as_str() {
+                "json" | "xml" | "pbrt" | "gltf" | "glb" => Some(format!("To render a scene: steradian render {word}")),
+                "exr" => Some(format!("To render the picture of an EXR file again: steradian rerender {word} -o OUT")),
+                "shard" => Some(format!("To merge shards: steradian merge {word} ... -o OUT")),
+                _ => None,
+            }
+        }
+        ErrorKind::UnknownArgument => {
+            let option = given(ContextKind::InvalidArg)?;
+            let (_, here) = OPTIONS.iter().find(|(other, _)| *other == option)?;
+            Some(format!("In place of {option}: {here}"))
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hint_for(line: &str) -> Option<String> {
+        let line = ["steradian"].into_iter().chain(line.split_whitespace());
+        hint(&crate::args::command_line().try_get_matches_from(line).unwrap_err())
+    }
+
+    #[test]
+    fn a_scene_without_a_command_is_to_be_rendered() {
+        assert_eq!(hint_for("a/room.json").unwrap(), "To render a scene: steradian render a/room.json");
+        assert!(hint_for("a.exr").unwrap().contains("rerender a.exr"));
+        assert_eq!(hint_for("rendr"), None);
+    }
+
+    #[test]
+    fn options_of_other_renderers_lead_to_those_here() {
+        let render = clap::Command::find_subcommand(&crate::args::command_line(), "render").unwrap().clone();
+        for (other, here) in OPTIONS {
+            assert_eq!(hint_for(&format!("render a.json {other}")).unwrap(), format!("In place of {other}: {here}"));
+            if let Some(option) = here.strip_prefix("--") {
+                let name: String = option.chars().take_while(|c| c.is_ascii_lowercase() || *c == '-').collect();
+                assert!(render.get_arguments().any(|arg| arg.get_long() == Some(name.as_str())), "{name}");
+            }
+        }
+        assert_eq!(hint_for("render a.json --nonsense"), None);
+    }
+}
