@@ -28,6 +28,7 @@ const OPTIONS: [(Trust, &[&str]); 3] = [
             "integrator",
             "max-depth",
             "strategy",
+            "roulette",
             "clamp",
             "regularize",
             "caustics",

@@ -3,8 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::PrincipledDesc;
-use super::lists::{Spread, spread, spread_option};
+use super::lists::{Spread, spread_option};
+use super::{AbsorptionDesc, PrincipledDesc};
 
 /// A colour: `[r, g, b]`, one number for grey, or `{ "texture": "name" }`.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
@@ -399,20 +399,6 @@ impl DielectricDesc {
     pub fn is_medium(&self) -> bool {
         self.priority.is_some() || self.absorption.is_some() || self.medium.is_some() || self.abbe.is_some()
     }
-}
-
-/// Absorption by Beer and Lambert's law: what is left of white light is `color` to the power of the way over
-/// `distance`.
-#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct AbsorptionDesc {
-    /// What is left of red, green and blue after `distance`, each above 0 and at most 1.
-    #[serde(deserialize_with = "spread")]
-    #[schemars(with = "Spread<3>")]
-    pub color: [f32; 3],
-    /// In world units, above 0. Default: 1.
-    #[serde(default = "one")]
-    pub distance: f32,
 }
 
 /// An image of normals in tangent space: red along u, green along v (upward in the image), blue along the normal, each

@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::lists::{Spread, spread};
+
 /// What fills closed surfaces, or everything: smoke, fog, milk. Light that goes through it is absorbed, scattered and
 /// given off.
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
@@ -22,6 +24,24 @@ pub struct MediumDesc {
     /// The directions into which light is scattered. Default: all alike.
     #[serde(default, skip_serializing_if = "PhaseDesc::is_isotropic")]
     pub phase: PhaseDesc,
+}
+
+/// Absorption by Beer and Lambert's law: what is left of white light is `color` to the power of the way over
+/// `distance`.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AbsorptionDesc {
+    /// What is left of red, green and blue after `distance`, each above 0 and at most 1.
+    #[serde(deserialize_with = "spread")]
+    #[schemars(with = "Spread<3>")]
+    pub color: [f32; 3],
+    /// In world units, above 0. Default: 1.
+    #[serde(default = "unit_distance")]
+    pub distance: f32,
+}
+
+fn unit_distance() -> f32 {
+    1.0
 }
 
 /// A coefficient of a medium, at least 0: one number, or one for each of red, green and blue.

@@ -26,10 +26,10 @@ pub use light::{
     SpotLightDesc,
 };
 pub use material::{
-    AbsorptionDesc, BumpMapDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc,
-    PhongLobeDesc, PlasticDesc, RangedDesc, RoughnessDesc, ScalarDesc,
+    BumpMapDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, PhongLobeDesc, PlasticDesc,
+    RangedDesc, RoughnessDesc, ScalarDesc,
 };
-pub use medium::{CoefficientDesc, MediumDesc, PhaseDesc};
+pub use medium::{AbsorptionDesc, CoefficientDesc, MediumDesc, PhaseDesc};
 pub use output::{CompressionDesc, CryptoManifestDesc, ExrProfileDesc, LayerKind, OutputDesc, PixelTypeDesc, ViewDesc};
 pub(crate) use principled::principled_parameters;
 pub use principled::{PrincipledDesc, PrincipledModelDesc};
