@@ -62,7 +62,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The material that reflects nothing.
-    fn black(&mut self, place: &str) -> String {
+    pub(super) fn black(&mut self, place: &str) -> String {
         if let Some(name) = &self.black {
             return name.clone();
         }

@@ -119,8 +119,12 @@ impl<'a> Reader<'a> {
             return Ok(None);
         };
         let flipped = element.boolean("flip_normals", false)?;
-        let bsdf = element.one("bsdf")?;
-        let (mut material, mut opacity) = self.surface(bsdf, &place, uv)?;
+        let (bsdf, emitter) = (element.one("bsdf")?, element.one("emitter")?);
+        let (mut material, mut opacity) = match (bsdf, emitter) {
+            // Mitsuba's default of a shape that emits reflects nothing.
+            (None, Some(_)) => (self.black(&place), None),
+            _ => self.surface(bsdf, &place, uv)?,
+        };
         let interface = self.medium_interface(&mut element)?;
         if let Some(container) = self.container(bsdf, &material, &interface) {
             (material, opacity) = (container, None);
@@ -133,7 +137,7 @@ impl<'a> Reader<'a> {
         {
             self.give_uvs(mesh, uv, &place);
         }
-        let emission = match element.one("emitter")? {
+        let emission = match emitter {
             Some(emitter) => self.emission(emitter, uv)?,
             None => None,
         };

@@ -74,6 +74,26 @@ fn transforms_of_uv_act_before_the_image_is_looked_up() {
 }
 
 #[test]
+fn shapes_without_a_bsdf_are_grey_in_front_and_black_if_they_emit() {
+    let desc = scene(
+        r#"<shape type="rectangle"/><shape type="rectangle"><emitter type="area"><rgb name="radiance" value="1"/></emitter>
+</shape><shape type="rectangle"><bsdf type="diffuse"/><emitter type="area"/></shape>"#,
+    );
+    let front_albedo = |i: usize| {
+        let mut material = &desc.materials[shape(&desc, i).common().material.unwrap()];
+        if let MaterialDesc::TwoSided { front, .. } = material {
+            material = &desc.materials[front];
+        }
+        match material {
+            MaterialDesc::Diffuse { albedo: ColorDesc::Grey(albedo), .. } => *albedo,
+            MaterialDesc::Diffuse { albedo: ColorDesc::Rgb([red, ..]), .. } => *red,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!([front_albedo(0), front_albedo(1), front_albedo(2)], [0.5, 0.0, 0.5]);
+}
+
+#[test]
 fn one_texture_on_different_shapes_becomes_two() {
     let desc = scene(
         r#"<bsdf type="diffuse" id="m"><texture type="bitmap" name="reflectance">
