@@ -1,7 +1,7 @@
 //! Shapes, their uv and their sides.
 
 use super::*;
-use crate::desc::{MeshDesc, MeshShadingDesc, SmoothByDesc, TextureDesc};
+use crate::desc::{ColorDesc, MeshDesc, MeshShadingDesc, SmoothByDesc, TextureDesc};
 
 #[track_caller]
 fn mesh(desc: &SceneDesc, i: usize) -> &MeshDesc {
@@ -76,8 +76,8 @@ fn transforms_of_uv_act_before_the_image_is_looked_up() {
 #[test]
 fn shapes_without_a_bsdf_are_grey_in_front_and_black_if_they_emit() {
     let desc = scene(
-        r#"<shape type="rectangle"/><shape type="rectangle"><emitter type="area"><rgb name="radiance" value="1"/></emitter>
-</shape><shape type="rectangle"><bsdf type="diffuse"/><emitter type="area"/></shape>"#,
+        r#"<shape type="rectangle"/><shape type="rectangle"><emitter type="area"/></shape>
+<shape type="rectangle"><bsdf type="diffuse"/><emitter type="area"/></shape>"#,
     );
     let front_albedo = |i: usize| {
         let mut material = &desc.materials[shape(&desc, i).common().material.unwrap()];
