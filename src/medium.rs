@@ -28,7 +28,7 @@ pub struct Medium {
     pub absorption: Rgb,
     /// and of scattering.
     pub scattering: Rgb,
-    /// Radiance that it gives off per unit of length.
+    /// Radiance that it emits per unit of length.
     pub emission: Rgb,
     /// How it scatters.
     pub phase: Phase,
@@ -84,7 +84,7 @@ impl Medium {
         !self.scattering.is_black() || !self.emission.is_black()
     }
 
-    /// Radiance that the medium gives off along `distance`, as it arrives at one end.
+    /// Radiance that the medium emits along `distance`, as it arrives at one end.
     pub fn emitted(&self, distance: f32) -> Rgb {
         let of = |emission: f32, extinction: f32| {
             let depth = extinction * distance;

@@ -69,7 +69,7 @@ pub struct SceneFeatures {
     pub delta_materials: bool,
     /// Some surface has a medium within it, or one is around everything: paths track their media.
     pub media: bool,
-    /// Some medium scatters or gives off light.
+    /// Some medium scatters or emits light.
     pub participating_media: bool,
     /// Some material is anisotropic: shading frames follow the surface's u direction.
     pub anisotropic: bool,

@@ -182,7 +182,7 @@ fn a_file_that_cannot_be_written_does_not_take_the_others_along() {
 }
 
 #[test]
-fn the_program_alone_tells_what_to_do_first() {
+fn without_arguments_first_steps_are_printed() {
     let folder = tempfile::tempdir().unwrap();
     let output = run(folder.path(), "");
     assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0));

@@ -33,7 +33,7 @@ fn placed(shape: Analytic) -> TransformedShape {
     TransformedShape::new(shape, transform(DMat3::IDENTITY, DVec3::ZERO))
 }
 
-/// A picture of light given off alone, 16 x 16, along -z.
+/// A picture of light emitted alone, 16 x 16, along -z.
 fn emission_only(shapes: Value, camera: Value) -> Image {
     render(&json!({
         "film": { "width": 16, "height": 16, "filter": { "type": "box" } },

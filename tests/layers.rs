@@ -152,7 +152,7 @@ fn parts_and_groups_sum_to_the_picture_whatever_the_integrator_does() {
     }
 }
 
-/// A view from the middle of a sphere that gives off light, or of things before a sky.
+/// A view from the middle of a sphere that emits light, or of things before a sky.
 fn room(rest: Value) -> Value {
     let mut scene = json!({
         "camera": { "position": [0, 0, 4], "look_at": [0, 0, 0], "vertical_fov_degrees": 10 },

@@ -1,4 +1,4 @@
-//! Media that scatter and give off light, against closed forms and quadratures.
+//! Media that scatter and emit light, against closed forms and quadratures.
 
 use std::f64::consts::PI;
 
@@ -337,7 +337,7 @@ fn media_that_make_no_sense() {
     assert_error(&folder, &scene, ErrorKind::Scene, &["integrator.caustics: ", "scatter"]);
     set(&mut scene, "integrator", json!({ "type": "path" }));
     set(&mut scene, "media.fog", json!({ "scattering": [1, 0, 1], "emission": 1 }));
-    assert_error(&folder, &scene, ErrorKind::Scene, &["medium: ", "gives off light"]);
+    assert_error(&folder, &scene, ErrorKind::Scene, &["medium: ", "emits light"]);
     set(&mut scene, "media.fog", json!({ "phase": { "type": "mie" } }));
     let error = folder.compile(&scene).err().unwrap().to_string();
     assert!(error.contains("media.fog.phase") && error.contains("mie"), "{error}");

@@ -97,7 +97,7 @@ mod nested_media;
 mod opacity;
 /// Our accelerators against the oracle: the same answers bit for bit, on anything, with bounded work.
 mod own_accelerators;
-/// Media that scatter and give off light.
+/// Media that scatter and emit light.
 mod participating_media;
 /// Planes without end.
 mod planes;

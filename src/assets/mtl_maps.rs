@@ -34,7 +34,7 @@ pub struct ObjMaps {
     pub opacity: Option<ObjMap>,
     /// `map_Ks`, factor on the specular colour.
     pub specular: Option<ObjMap>,
-    /// `map_Ke`, factor on the light given off.
+    /// `map_Ke`, factor on the light emitted.
     pub emission: Option<ObjMap>,
     /// Other maps, by their keys.
     pub unused: Vec<String>,

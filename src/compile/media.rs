@@ -86,7 +86,7 @@ impl<'a> NamedMedia<'a> {
         let medium = self.get(files, "medium", name)?;
         let [emission, extinction] = [medium.emission, medium.extinction()].map(Rgb::to_array);
         if emission.into_iter().zip(extinction).any(|(e, t)| e > 0.0 && t == 0.0) {
-            let message = "gives off light but neither absorbs nor scatters it: all around, that is infinitely much";
+            let message = "emits light but neither absorbs nor scatters it: all around, that is infinitely much";
             return Err(files.error("medium", message));
         }
         Ok(Some(medium))

@@ -156,7 +156,7 @@ pub struct Placement<'a> {
     pub shading: MeshShadingDesc,
     pub smoothing: Smoothing,
     pub reverse_normal: bool,
-    /// Whether the mesh gives off light.
+    /// Whether the mesh emits light.
     pub emits: bool,
     /// Names of attributes by their ids.
     pub attributes: &'a [String],

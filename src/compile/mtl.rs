@@ -21,7 +21,7 @@ use crate::texture::{Bitmap, Channel, Decoding, Texture, UvTransform, Wrap};
 /// What a material of an MTL comes to.
 pub struct MtlBinding {
     pub binding: MaterialBinding,
-    /// Light given off, if not black.
+    /// Light emitted, if not black.
     pub emission: Option<Emission>,
 }
 
@@ -224,7 +224,7 @@ fn without_blacks(mtl: &ObjMaterial, has_map: [bool; 3]) -> ObjMaterial {
 /// What an MTL makes of a surface.
 struct MtlSurface {
     material: Material,
-    /// Light given off, if not black.
+    /// Light emitted, if not black.
     radiance: Option<Rgb>,
 }
 

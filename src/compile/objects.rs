@@ -250,7 +250,7 @@ impl Builder {
             for emitter in &object.emitters {
                 let outer = outer.as_constant().ok_or_else(|| {
                     self.files
-                        .error(&format!("{path}.motion"), format!("object \"{name}\" gives off light and cannot move"))
+                        .error(&format!("{path}.motion"), format!("object \"{name}\" emits light and cannot move"))
                 })?;
                 let mut emitter = emitter.clone();
                 emitter.surface.identity.placement = placement;

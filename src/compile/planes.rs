@@ -23,7 +23,7 @@ pub(super) fn compile(files: &CompileContext, path: &str, desc: &PlaneDesc, comm
     if common.emission.is_some() {
         return Err(files.error(
             &format!("{path}.emission"),
-            "a plane cannot give off light: its area, which would be sampled, has no end; use a quad",
+            "a plane cannot emit light: its area, which would be sampled, has no end; use a quad",
         ));
     }
     if !common.motion.is_empty() {

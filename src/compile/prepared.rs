@@ -34,7 +34,7 @@ pub struct PreparedShape {
 #[derive(Clone, Copy, Debug)]
 pub struct PreparedSurface {
     pub binding: MaterialBinding,
-    /// Light that it gives off, not black.
+    /// Light that it emits, not black.
     pub emission: Option<PreparedEmission>,
     /// What it is called.
     pub identity: ShapeIdentity,
@@ -43,7 +43,7 @@ pub struct PreparedSurface {
 /// The least size of a mesh in render space: below, cross products of its edges leave `f32`.
 const SMALLEST_MESH: f64 = 1.0 / (1u64 << 40) as f64;
 
-/// Light given off, and the group it belongs to.
+/// Light emitted, and the group it belongs to.
 #[derive(Clone, Copy, Debug)]
 pub struct PreparedEmission {
     /// The light.
@@ -120,7 +120,7 @@ impl Builder {
         let emission = self.emission(path, &common)?;
         binding.opacity = self.opacity(path, &common)?;
         if motion.is_some() && emission.is_some() {
-            return Err(self.files.error(&format!("{path}.motion"), "a shape that gives off light cannot move"));
+            return Err(self.files.error(&format!("{path}.motion"), "a shape that emits light cannot move"));
         }
         let surface = PreparedSurface { binding, emission, identity };
         if !matches!(desc, ShapeDesc::Mesh(_)) {
@@ -188,7 +188,7 @@ impl Builder {
             let attributes = &mut loaded.data.attributes;
             self.check_attributes(path, desc.file.as_deref(), &surface, desc.material.as_deref(), Some(attributes))?;
             if moves && emission.is_some() {
-                return Err(self.files.error(path, "a shape that gives off light cannot move"));
+                return Err(self.files.error(path, "a shape that emits light cannot move"));
             }
             prepared.push(PreparedShape {
                 form: ShapeSource::Mesh {
@@ -317,7 +317,7 @@ impl Builder {
         if medium.is_some() && emission.is_some() {
             return Err(self
                 .files
-                .error(&path, "the surface of a medium cannot give off light: it may turn out to be no boundary"));
+                .error(&path, "the surface of a medium cannot emit light: it may turn out to be no boundary"));
         }
         let (material, normal_perturbation) = (binding.material, binding.normal_perturbation);
         let mut surface = Surface { material, normal_perturbation, medium, first_light: None, single_light: false };
@@ -328,7 +328,7 @@ impl Builder {
                 surface.single_light = lights.len() == 1;
                 surface.first_light = Some(self.lights.add(lights.into_iter().map(Light::Area), group));
             } else {
-                self.files.warn(&format!("{path}.emission"), format_args!("the shape is too small to give off light"));
+                self.files.warn(&format!("{path}.emission"), format_args!("the shape is too small to emit light"));
             }
         }
         self.surfaces.push(surface);

@@ -142,7 +142,7 @@ impl TextureTable {
         })
     }
 
-    /// The texture that `path` names, for light given off: no channel is below 0.
+    /// The texture that `path` names, for light emitted: no channel is below 0.
     pub fn radiance(&self, files: &CompileContext, path: &str, name: &str) -> Result<ColorInput> {
         let id = self.find(files, path, name, TextureUse::Color)?;
         let [min, _] = self.get(id).range();

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::lists::{Spread, spread};
 
 /// What fills closed surfaces, or everything: smoke, fog, milk. Light that goes through it is absorbed, scattered and
-/// given off.
+/// emitted.
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MediumDesc {
@@ -18,7 +18,7 @@ pub struct MediumDesc {
     /// over extinction is the albedo of a single scattering. Default: 0.
     #[serde(default, skip_serializing_if = "CoefficientDesc::is_zero")]
     pub scattering: CoefficientDesc,
-    /// Radiance given off per world unit. Default: 0.
+    /// Radiance emitted per world unit. Default: 0.
     #[serde(default, skip_serializing_if = "CoefficientDesc::is_zero")]
     pub emission: CoefficientDesc,
     /// The directions into which light is scattered. Default: all alike.

@@ -125,7 +125,7 @@ pub enum LayerKind {
     VolumeDirect,
     /// Light scattered more than once, the last time before the camera by a medium.
     VolumeIndirect,
-    /// Light given off by the surface that is seen, or by a medium before it.
+    /// Light emitted by the surface that is seen, or by a medium before it.
     Emission,
     /// Light from infinity that is seen directly.
     Background,

@@ -231,7 +231,7 @@ pub enum IntegratorDesc {
         /// as samples are added. Default: none, no bias.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         regularize: Option<f32>,
-        /// Whether what gives off light is hidden from the camera: its rays pass through emitting shapes, both sides of
+        /// Whether what emits light is hidden from the camera: its rays pass through emitting shapes, both sides of
         /// them, and show no light from infinity, where alpha is 0. Light, mirror images and what is seen through glass
         /// stay. Default: false.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]

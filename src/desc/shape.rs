@@ -35,7 +35,7 @@ macro_rules! shapes {
                 /// rays too, pass through the rest. Default: 1, or that of an MTL. Not with `emission`.
                 #[serde(default, skip_serializing_if = "Option::is_none")]
                 pub opacity: Option<OpacityDesc>,
-                /// Light that the shape gives off.
+                /// Light that the shape emits.
                 #[serde(default, skip_serializing_if = "Option::is_none")]
                 pub emission: Option<EmissionDesc>,
                 /// Whether the front is the side against the shape's own normal.
@@ -115,7 +115,7 @@ pub struct ShapeCommon<'a> {
     pub motion: &'a [KeyframeDesc],
     /// How much of the surface is there.
     pub opacity: Option<&'a OpacityDesc>,
-    /// Light that the shape gives off.
+    /// Light that the shape emits.
     pub emission: Option<&'a EmissionDesc>,
     /// Whether the front is the side against the shape's own normal.
     pub reverse_normal: bool,
@@ -140,7 +140,7 @@ shapes! {
         /// A PLY (binary or ASCII) or OBJ file, relative to the scene file. Without a `material` here, an OBJ uses
         /// those of its MTL: `illum` 5 is a mirror of colour Ks; 4, 6, 7 and 9 are glass of index Ni; a specular colour
         /// Ks with an exponent Ns has alpha = sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic
-        /// with base Kd otherwise; all else is diffuse with Kd. Ke is radiance given off. `map_Kd` is a texture times
+        /// with base Kd otherwise; all else is diffuse with Kd. Ke is radiance emitted. `map_Kd` is a texture times
         /// Kd (times 1 if Kd is black), where the faces have uv, and so are `map_Ke` times Ke and, on mirrors and
         /// metals, `map_Ks` times Ks; `norm` is a normal map, `bump` and `map_Bump` are one if their image has colours,
         /// else heights in world units times `-bm`. `d` (or 1 - `Tr`) is the opacity of what is not glass, times
@@ -222,7 +222,7 @@ shapes! {
     }
     /// A plane through `point`, without end: a square that reaches 10,000 times as far as everything else in the scene
     /// and the camera. u and v are lengths from `point`: textures repeat. It stands in the world, not in an object, and
-    /// can neither move nor give off light.
+    /// can neither move nor emit light.
     Plane(PlaneDesc) {
         /// A point of the plane, where u and v are 0. Default: the origin.
         #[serde(default)]
@@ -437,7 +437,7 @@ pub enum OpacityDesc {
     },
 }
 
-/// Light given off by a shape.
+/// Light emitted by a shape.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EmissionDesc {

@@ -212,7 +212,7 @@ impl LayerInfo {
         part!(TransmissionIndirect, "transmission_indirect", "light scattered more than once, last through a surface"),
         part!(VolumeDirect, "volume_direct", "light scattered once, by a medium"),
         part!(VolumeIndirect, "volume_indirect", "light scattered more than once, last by a medium"),
-        part!(Emission, "emission", "light given off by what is seen; sums with the nine others to RGB"),
+        part!(Emission, "emission", "light emitted by what is seen; sums with the nine others to RGB"),
         part!(Background, "background", "light from infinity that is seen directly"),
         Self::new(
             LayerKind::LightGroups,

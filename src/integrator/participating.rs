@@ -1,4 +1,4 @@
-//! Rays through media that scatter and give off light.
+//! Rays through media that scatter and emit light.
 //!
 //! Distances are sampled for one channel, which is chosen by what the path carries of each, and weighted by the balance
 //! heuristic over all channels (Wilkie et al., "Hero Wavelength Spectral Sampling").
@@ -17,7 +17,7 @@ pub(super) struct MediumPath {
     pub hit: Option<Hit>,
     /// Factor on the path's throughput.
     pub weight: Rgb,
-    /// Radiance that media give off along the ray, before the throughput.
+    /// Radiance that media emit along the ray, before the throughput.
     pub emitted: Rgb,
     /// Surfaces passed.
     pub passed: u32,

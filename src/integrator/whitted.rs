@@ -29,7 +29,7 @@ pub struct Whitted {
     pub max_depth: u32,
     /// Radiance of the ambient light.
     pub ambient: Rgb,
-    /// Whether the camera does not see what gives off light.
+    /// Whether the camera does not see what emits light.
     pub hide_emitters: bool,
     /// Where random numbers come from.
     pub sampler: Sampler,

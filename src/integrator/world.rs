@@ -146,7 +146,7 @@ impl<'a> World<'a> {
         None
     }
 
-    /// Light that the surface gives off towards `wo` (unit, away from it).
+    /// Light that the surface emits towards `wo` (unit, away from it).
     pub fn emitted(&self, at: &SurfaceInteraction, wo: Vec3) -> Rgb {
         let light = self.scene.surface(at.shape).light(at.prim).map(|id| self.scene.lights.get(id));
         match light {

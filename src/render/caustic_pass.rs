@@ -44,7 +44,7 @@ impl CausticPass {
     /// For a scene; `None` if nothing in it can cast caustics, or if the camera sees nothing.
     pub fn new(scene: &Scene, accel: &dyn Accelerator, settings: &Settings) -> Option<Self> {
         if scene.features.participating_media {
-            tracing::warn!("photons are not traced through media that scatter or give off light");
+            tracing::warn!("photons are not traced through media that scatter or emit light");
             return None;
         }
         let casters = CausticCasters::new(scene)?;

@@ -31,8 +31,8 @@ const DARKEST: f32 = 0.25;
 /// The largest relative squared error that a sample counts with.
 const LARGEST_ERROR: f64 = 20.0;
 
-/// Paths go on this many times as often as the variance of groups asks for: many samples spread better than few, and
-/// roulette undoes some of it. Errors times rays on three interiors are least between 1 and 2.
+/// Factor on survival probabilities: the variance of groups is larger than that of many samples, which spread better.
+/// Errors times rays on three interiors are least between 1 and 2.
 const SURVIVAL_SCALE: f32 = 1.5;
 
 /// What the pilot of a picture has found.

@@ -111,7 +111,7 @@ fn room() -> Value {
     })
 }
 
-/// A hilly floor below many lamps, which give off as much light together however many they are.
+/// A hilly floor below many lamps, which emit as much light together however many they are.
 fn below_lamps(count: usize) -> Value {
     let radiance = 10.0 * lamp_cells(count).pow(2) as f64 / count as f64;
     json!({

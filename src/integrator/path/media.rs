@@ -58,7 +58,7 @@ fn arrive(context: &Context, paths: &mut PathRows, i: usize, state: &mut MediaSt
     state.ior = ior.map(|ior| ior.of(state.channel));
 }
 
-/// Takes every path to the next point of a medium or surface that scatters it, and adds what media give off on the way;
+/// Takes every path to the next point of a medium or surface that scatters it, and adds what media emit on the way;
 /// the result is how many more rays that took.
 #[inline(never)]
 pub(super) fn scatter(context: &Context, wave: &mut Wave, out: &mut Output) -> u64 {

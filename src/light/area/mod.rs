@@ -25,7 +25,7 @@ use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{DVec3, Ray, Vec3};
 use crate::texture::{Footprint, Texture};
 
-/// Light given off by a surface.
+/// Light emitted by a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Emission {
     /// Radiance.
@@ -59,7 +59,7 @@ impl Emission {
         self.radiance * texture.color_over(point)
     }
 
-    /// Whether all points of the surface give off the same light.
+    /// Whether all points of the surface emit the same light.
     #[inline]
     fn is_even(&self) -> bool {
         self.texture.is_none() && self.opacity.is_none()

@@ -22,7 +22,7 @@ use crate::file;
 
 const MAGIC: [u8; 8] = *b"STERFILM";
 const END: [u8; 8] = *b"STEREND\n";
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 const BUFFER: usize = 1 << 20;
 /// The marks at the beginning.
 const START: u64 = 12;

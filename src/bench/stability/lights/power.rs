@@ -1,4 +1,4 @@
-//! What lights give off.
+//! What lights emit.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
@@ -89,7 +89,7 @@ fn shapes() -> Vec<Lamp> {
         let exact = 2.25 * PI * area(name);
         let geometry = place(shape, map);
         for (sides, emission) in [(1.0, WHITE), (2.0, TWO_SIDED)] {
-            // What the inside of a whole sphere gives off never leaves it.
+            // What the inside of a whole sphere emits never leaves it.
             if sides == 2.0 && name == "sphere" {
                 continue;
             }

@@ -24,7 +24,7 @@ pub fn add(source: GltfSource, tree: &Tree, pose: &Pose, draft: &mut Draft) -> R
             .ok_or_else(|| source.fault(&format!("{path}.extensions.{NAME}"), format!("no light {}", index.light)))?;
         if !found {
             let how =
-                "1 candela is taken for 1 W/sr, 1 lux for 1 W/m², and 1 nit of what surfaces give off for 1 W/(sr m²)";
+                "1 candela is taken for 1 W/sr, 1 lux for 1 W/m², and 1 nit of what surfaces emit for 1 W/(sr m²)";
             draft.approximated("extensions", NAME, "units", how);
         }
         found = true;

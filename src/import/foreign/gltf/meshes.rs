@@ -23,7 +23,7 @@ use crate::math::{DAffine3, DQuat, DVec3, Transform};
 pub(crate) struct Placed {
     /// The corners of a box around each mesh.
     pub corners: Vec<DVec3>,
-    /// Whether a surface gives off more light than a white one reflects in the default light.
+    /// Whether a surface emits more light than a white one reflects in the default light.
     pub gives_light: bool,
 }
 

@@ -1,7 +1,7 @@
 //! glTF 2.0 scenes, `.gltf` and `.glb`.
 //!
 //! The JSON and the indices in it are checked by the crate `gltf`; buffers, images and extensions are read here. A path
-//! tracer shows both sides of every surface, whatever `doubleSided` is; only light is given off by one side of what is
+//! tracer shows both sides of every surface, whatever `doubleSided` is; only light is emitted by one side of what is
 //! not double-sided.
 
 mod accessors;

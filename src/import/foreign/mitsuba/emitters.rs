@@ -61,7 +61,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// The light that a shape gives off.
+    /// The light that a shape emits.
     pub(super) fn emission(&mut self, id: PluginId, uv: UvOrigin) -> Result<Option<EmissionDesc>> {
         let mut element = Element::new(self.document, id);
         if element.kind() != "area" {

@@ -77,7 +77,7 @@ impl Reader<'_> {
         if element.boolean("hide_emitters", false)? {
             match &mut self.draft.desc.integrator {
                 IntegratorDesc::Path { hide_emitters, .. } => *hide_emitters = true,
-                _ => element.ignored("hide_emitters", "surfaces are shown whether or not they give off light"),
+                _ => element.ignored("hide_emitters", "surfaces are shown whether or not they emit light"),
             }
         }
         element.finish(&mut self.draft);
@@ -88,10 +88,10 @@ impl Reader<'_> {
 /// A path tracer with the depths of an integrator.
 fn path(element: &mut Element) -> Result<IntegratorDesc> {
     let max_depth = element.integer("max_depth")?.unwrap_or(-1);
-    // A path of no segments sees nothing; the shortest one here sees what gives off light.
+    // A path of no segments sees nothing; the shortest one here sees what emits light.
     let max_depth = u32::try_from(max_depth).unwrap_or(UNLIMITED);
     if max_depth == 0 {
-        element.approximated("max_depth", "1 in place of 0: what gives off light is seen");
+        element.approximated("max_depth", "1 in place of 0: what emits light is seen");
     }
     let rr_depth = element.count("rr_depth", 1)?.unwrap_or(5);
     Ok(IntegratorDesc::path(max_depth.max(1), rr_depth))

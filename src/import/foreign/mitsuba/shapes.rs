@@ -142,7 +142,7 @@ impl<'a> Reader<'a> {
             None => None,
         };
         if emission.is_some() && opacity.take().is_some() {
-            element.ignored("", "what gives off light has no holes");
+            element.ignored("", "what emits light has no holes");
         }
         element.ignored_plugins("sensor", "a sensor on a shape is no camera")?;
         // How often silhouettes are sampled for derivatives.

@@ -1,4 +1,4 @@
-//! Light that shapes give off.
+//! Light that shapes emit.
 
 use super::colors::{Colors, Meaning};
 use super::params::Params;

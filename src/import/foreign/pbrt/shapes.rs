@@ -34,7 +34,7 @@ pub struct Shapes<'a> {
     pub world: World,
     /// The scene file.
     pub scene: &'a Path,
-    /// Whether it is part of an object, where nothing can give off light.
+    /// Whether it is part of an object, where nothing can emit light.
     pub in_object: bool,
 }
 
@@ -57,10 +57,10 @@ enum Form {
     File(String),
 }
 
-/// The transforms of a shape; what gives off light does not move.
+/// The transforms of a shape; what emits light does not move.
 fn still_if_lit(draft: &mut Draft, params: &Params, mut ctm: Ctm, is_light: bool) -> Ctm {
     if is_light && ctm.is_moving() {
-        let how = "what gives off light stands still where it is at first";
+        let how = "what emits light stands still where it is at first";
         draft.approximated(&params.place, &params.element, "transform", how);
         ctm.0[1] = ctm.0[0];
     }
@@ -78,11 +78,11 @@ fn container(draft: &mut Draft, media: &mut MediumTable, params: &Params, graphi
     media.container(draft, params, &graphics.media, own)
 }
 
-/// The name of a shape's material; black for what gives off light at an interface.
+/// The name of a shape's material; black for what emits light at an interface.
 fn material_name(draft: &mut Draft, params: &Params, graphics: &Graphics) -> Option<String> {
     match graphics.material.as_deref()? {
         ShapeMaterial::Interface => {
-            let how = "black, for what gives off light is no mere boundary";
+            let how = "black, for what emits light is no mere boundary";
             draft.approximated(&params.place, &params.element, "Material", how);
             Some(black(draft, &params.place))
         }
@@ -101,7 +101,7 @@ impl Shapes<'_> {
     ) -> Result<Option<ShapeDesc>> {
         let mut light = graphics.area_light.as_deref();
         if light.is_some() && self.in_object {
-            draft.ignored(&params.place, &params.element, "AreaLightSource", "instances give off no light, as in pbrt");
+            draft.ignored(&params.place, &params.element, "AreaLightSource", "instances emit no light, as in pbrt");
             light = None;
         }
         let container = if light.is_none() { container(draft, media, params, graphics) } else { None };
@@ -115,7 +115,7 @@ impl Shapes<'_> {
         let material = container.or_else(|| material_name(draft, params, graphics));
         let alpha = self.textures.number(params, &self.colors, "alpha", 1.0)?;
         if light.is_some() && params.has("alpha") {
-            params.ignore("alpha", "what gives off light has no holes");
+            params.ignore("alpha", "what emits light has no holes");
         }
         let opacity = if light.is_none() { alpha.opacity(draft, &params.place) } else { None };
         let needs = self.needs(graphics, light, matches!(&opacity, Some(crate::desc::OpacityDesc::Texture { .. })));

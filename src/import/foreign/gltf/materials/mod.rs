@@ -155,7 +155,7 @@ impl<'a> Builder<'a, '_> {
     fn build(&mut self) -> Result<PrimitiveMaterial> {
         let is_unlit = self.extensions().is_some_and(|all| all.contains_key(UNLIT));
         if is_unlit && self.tint != [1.0; 4] {
-            self.approximated("COLOR_0", "the mean of the vertices' colours is a factor on the light given off");
+            self.approximated("COLOR_0", "the mean of the vertices' colours is a factor on the light emitted");
         } else if self.mixes_alpha && !matches!(self.json.alpha_mode, Checked::Valid(AlphaMode::Opaque)) {
             self.approximated("COLOR_0", "the mean of the vertices' alpha is a factor on alpha");
         } else if self.is_colored || self.tint != [1.0; 4] {
@@ -174,7 +174,7 @@ impl<'a> Builder<'a, '_> {
             None => (None, false),
         };
         if is_medium && emission.take().is_some() {
-            self.ignored("emissiveFactor", "what absorbs light within cannot give off light");
+            self.ignored("emissiveFactor", "what absorbs light within cannot emit light");
         }
         if self.json.occlusion_texture.is_some() {
             self.ignored("occlusionTexture", "paths of light find what is occluded");
@@ -253,9 +253,9 @@ impl<'a> Builder<'a, '_> {
         Ok(Some(Glossy { glossiness: ext.glossiness_factor, specular }))
     }
 
-    /// A surface that looks the same in any light: black, and it gives off its colour.
+    /// A surface that looks the same in any light: black, and it emits its colour.
     fn unlit(&mut self) -> Result<(Option<MaterialDesc>, Option<EmissionDesc>)> {
-        self.approximated(UNLIT, "gives off its colour as light, and so lights what is around it");
+        self.approximated(UNLIT, "emits its colour as light, and so lights what is around it");
         let [r, g, b, _] = self.color_factor;
         let texture = self.color_texture.clone();
         let emission = self.light(texture.as_ref(), [r, g, b])?;
@@ -263,7 +263,7 @@ impl<'a> Builder<'a, '_> {
         Ok((Some(black), emission))
     }
 
-    /// Light that the surface gives off.
+    /// Light that the surface emits.
     fn emission(&mut self) -> Result<Option<EmissionDesc>> {
         let strength = self.extension::<ext::EmissiveStrength>("KHR_materials_emissive_strength")?;
         let factor = self.json.emissive_factor.0.map(|f| f * strength.as_ref().map_or(1.0, |s| s.emissive_strength));

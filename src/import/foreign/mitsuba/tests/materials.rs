@@ -219,7 +219,7 @@ fn masks_and_null_are_holes_of_the_shape() {
     // The luminance counts, not the alpha that the image may have: the product of one factor is no image.
     let Some(OpacityDesc::Texture { texture, .. }) = textured else { panic!() };
     assert!(matches!(textures[&texture], TextureDesc::Product { .. }));
-    // What gives off light has no holes here.
+    // What emits light has no holes here.
     let lamp = r#"<shape type="sphere"><bsdf type="null"/><emitter type="area"/></shape>"#;
     assert!(scene(lamp).shapes[0].common().opacity.is_none());
     assert!(!notes(lamp).is_empty());
