@@ -10,8 +10,8 @@ use crate::integrator::light_events::LightEvent;
 use crate::integrator::media::MediaState;
 use crate::integrator::participating::{DistanceSample, ShadowEnd};
 use crate::light::light_target;
-use crate::math::Ray;
 use crate::math::rows::BATCH;
+use crate::math::{Ray, RayCone, RayRows};
 use crate::medium::RelativeIor;
 use crate::sampling::PixelSeed;
 
@@ -24,7 +24,6 @@ pub(super) fn pass_boundaries(context: &Context, wave: &mut Wave) -> u64 {
         let Wave { paths, rays, hits, media, cones, light_aovs, .. } = wave;
         let (paths, state) = (&mut paths[block], &mut media[index]);
         let mut ray = rays[block].get(i);
-        let start = ray.origin;
         let segment = context.world.trace_through_null_boundaries(&mut ray, hits[block].get(i), state);
         hits[block].set(i, segment.hit);
         paths.throughput.set(i, paths.throughput.get(i) * segment.transmittance);
@@ -33,14 +32,20 @@ pub(super) fn pass_boundaries(context: &Context, wave: &mut Wave) -> u64 {
             // No shadow ray would have come so far.
             paths.flags[i] |= path_flags::SPECULAR;
             passed += u64::from(segment.passed);
-            if let Some(cone) = cones.get_mut(index) {
-                *cone = cone.moved((ray.origin - start).length());
-            }
-            rays[block].set(i, &ray);
+            move_ray(&mut rays[block], cones, index, &ray);
         }
         arrive(context, paths, i, state, segment.ior);
     }
     passed
+}
+
+/// Replaces the ray of a path by one that starts farther along it.
+fn move_ray(rays: &mut RayRows, cones: &mut [RayCone], index: usize, ray: &Ray) {
+    let lane = index % BATCH;
+    if let Some(cone) = cones.get_mut(index) {
+        *cone = cone.moved((ray.origin - rays.origin.get(lane)).length());
+    }
+    rays.set(lane, ray);
 }
 
 /// Arrives at a surface, of this relative index of refraction if it is a boundary between media.
@@ -68,7 +73,7 @@ pub(super) fn scatter(context: &Context, wave: &mut Wave, out: &mut Output) -> u
         let Wave { paths, rays, hits, media, cones, light_aovs, .. } = wave;
         let (paths, state) = (&mut paths[block], &mut media[index]);
         let mut ray = rays[block].get(i);
-        let (start, throughput) = (ray.origin, paths.throughput.get(i));
+        let throughput = paths.throughput.get(i);
         let u = context.config.sampler.sample_4d(
             PixelSeed(paths.seed[i]),
             paths.sample[i],
@@ -86,10 +91,7 @@ pub(super) fn scatter(context: &Context, wave: &mut Wave, out: &mut Output) -> u
         light_aovs.absorb(index, path.weight);
         if path.passed > 0 {
             passed += u64::from(path.passed);
-            if let Some(cone) = cones.get_mut(index) {
-                *cone = cone.moved((ray.origin - start).length());
-            }
-            rays[block].set(i, &ray);
+            move_ray(&mut rays[block], cones, index, &ray);
         }
         arrive(context, paths, i, state, path.ior);
     }
