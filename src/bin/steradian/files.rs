@@ -38,7 +38,7 @@ impl<'a> NamedFiles<'a> {
                 self.written.extend(named.into_iter().filter_map(|(path, option)| Some((path.clone()?, option))));
                 self.import = Some(&arguments.import);
             }
-            // The command line has no other form of it that is valid.
+            // A valid `replay` has become `render` before the line is parsed.
             Command::Replay(_) => {}
             Command::Rerender(arguments) => {
                 self.read.push((&arguments.file, "the picture to render again"));

@@ -238,9 +238,9 @@ pub struct RenderArgs {
     pub strategy: Option<StrategyDesc>,
     /// Russian roulette: auto, throughput or off
     ///
-    /// auto: by what a path may still add to its pixel and by what that costs, as a pilot of an eighth of a sample per
-    /// pixel finds both; throughput: by the throughput, from depth 5 or that of the scene, if it is less; off: no path
-    /// ends early. All are unbiased. Default: as the scene has it
+    /// auto: by the expected contribution of a path to its pixel and the expected cost, both estimated from a pilot of
+    /// 1/8 sample per pixel; throughput: by path throughput, from depth 5 or the scene's rr_depth if that is smaller;
+    /// off: no roulette. All are unbiased. Default: the scene's setting
     #[arg(long, value_name = "NAME", value_parser = names::plain::<RouletteDesc>(), help_heading = "Algorithm")]
     pub roulette: Option<RouletteDesc>,
     /// Clamp the contribution of a single path of indirect light: less noise, but biased (too dark). Off by default;
