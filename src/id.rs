@@ -37,6 +37,8 @@ ids! {
     MaterialId,
     /// A medium.
     MediumId,
+    /// What differs within a medium.
+    VolumeId,
     /// A texture.
     TextureId,
     /// The name of an attribute of meshes.

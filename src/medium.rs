@@ -5,11 +5,22 @@
 //! the way that light took to it: a boundary is where what is there changes, and light finds the same boundaries in
 //! either direction.
 
+mod blocks;
+mod noise;
+mod volume;
+mod voxels;
+
+pub use noise::Noise;
+pub use volume::{Coefficients, Flight, Split, Tracked, Volume, VolumeGrids};
+pub use voxels::{Border, VoxelGrid};
+
 use std::cmp::Ordering;
 
-use crate::bsdf::Phase;
+use crate::bsdf::{Phase, PhaseLobe, WeightedLobe};
 use crate::color::Rgb;
-use crate::id::MediumId;
+use crate::id::{MediumId, VolumeId};
+use crate::math::random::hash64;
+use crate::math::{DVec3, Ray, RenderSpace, Rng};
 
 /// Wavelengths in nanometres of red, green and blue, as for the indices of metals.
 const WAVELENGTHS: [f32; 3] = [650.0, 550.0, 450.0];
@@ -32,6 +43,8 @@ pub struct Medium {
     pub emission: Rgb,
     /// How it scatters.
     pub phase: Phase,
+    /// What differs from place to place, if anything does.
+    pub volume: Option<VolumeId>,
 }
 
 impl Medium {
@@ -39,13 +52,15 @@ impl Medium {
     /// of refraction, then the one that absorbs more, then the one that scatters more. Media that are equal in all that
     /// are one medium.
     pub fn precedence(&self, other: &Self) -> Ordering {
-        let phase = |phase: Phase| match phase {
-            Phase::HenyeyGreenstein { g } => [0.0, g, 0.0],
-            Phase::Rayleigh => [1.0, 0.0, 0.0],
+        let lobe = |&WeightedLobe { weight, lobe }: &WeightedLobe| match lobe {
+            PhaseLobe::HenyeyGreenstein { g } => [0.0, g, weight],
+            PhaseLobe::Rayleigh => [1.0, 0.0, weight],
         };
         let key = |m: &Self| {
             let [absorption, scattering, emission] = [m.absorption, m.scattering, m.emission].map(Rgb::to_array);
-            [m.ior, absorption, scattering, emission, phase(m.phase)].concat()
+            let volume = [m.volume.map_or(-1.0, |id| id.0 as f32), m.phase.lobes().len() as f32, 0.0];
+            let lobes = m.phase.lobes().iter().map(lobe);
+            [m.ior, absorption, scattering, emission, volume].into_iter().chain(lobes).flatten().collect::<Vec<_>>()
         };
         let ties = key(self).into_iter().zip(key(other)).map(|(a, b)| b.total_cmp(&a));
         other.priority.cmp(&self.priority).then(ties.fold(Ordering::Equal, Ordering::then))
@@ -60,6 +75,7 @@ impl Medium {
             scattering: Rgb::BLACK,
             emission: Rgb::BLACK,
             phase: Phase::ISOTROPIC,
+            volume: None,
         }
     }
 
@@ -69,19 +85,10 @@ impl Medium {
         self.absorption + self.scattering
     }
 
-    /// What it scatters of the light that it takes.
-    pub fn albedo(&self) -> Rgb {
-        let of = |scattering: f32, absorption: f32| {
-            if scattering > 0.0 { scattering / (scattering + absorption) } else { 0.0 }
-        };
-        let (scattering, absorption) = (self.scattering, self.absorption);
-        Rgb::new(of(scattering.r, absorption.r), of(scattering.g, absorption.g), of(scattering.b, absorption.b))
-    }
-
     /// Whether it does more than to absorb.
     #[inline]
     pub fn is_participating(&self) -> bool {
-        !self.scattering.is_black() || !self.emission.is_black()
+        !self.scattering.is_black() || !self.emission.is_black() || self.volume.is_some()
     }
 
     /// Radiance that the medium emits along `distance`, as it arrives at one end.
@@ -116,6 +123,12 @@ pub fn dispersed(ior: f32, abbe: f32) -> [f32; 3] {
 #[inline]
 pub fn transmittance(extinction: Rgb, distance: f32) -> Rgb {
     extinction.map(|a| if a > 0.0 { (-a * distance).exp() } else { 1.0 })
+}
+
+/// Random numbers of a ray: the same ones each time.
+pub fn random_of_ray(ray: &Ray) -> Rng {
+    let words = [ray.origin, ray.direction].map(|v| v.to_array().map(f32::to_bits));
+    Rng::new(words.as_flattened().iter().fold(0, |hash, &word| hash64(hash ^ u64::from(word))))
 }
 
 /// Different media that may overlap at one point.
@@ -216,6 +229,8 @@ pub enum RelativeIor {
 pub struct Media {
     /// By [`MediumId`], in the order of precedence.
     list: Vec<Medium>,
+    /// By [`VolumeId`].
+    volumes: Vec<Volume>,
     /// What is where no surface of a medium is around a point.
     around: Option<MediumId>,
 }
@@ -226,9 +241,37 @@ impl Media {
         let mut list: Vec<Medium> = media.into_iter().chain(around).collect();
         list.sort_by(Medium::precedence);
         list.dedup();
-        let mut media = Self { list, around: None };
+        let mut media = Self { list, volumes: Vec::new(), around: None };
         media.around = around.and_then(|around| media.id(&around));
         media
+    }
+
+    /// With what differs within them, by [`VolumeId`].
+    #[must_use]
+    pub fn with_volumes(self, volumes: Vec<Volume>) -> Self {
+        Self { volumes, ..self }
+    }
+
+    /// What differs within a medium, if anything does.
+    #[inline]
+    pub fn volume(&self, medium: &Medium) -> Option<&Volume> {
+        medium.volume.map(|id| &self.volumes[id.index()])
+    }
+
+    /// What a medium scatters at a point of the light that it takes there.
+    pub fn albedo(&self, id: MediumId, p: DVec3) -> Rgb {
+        let medium = self.get(id);
+        let of = |scattering: f32, absorption: f32| {
+            if scattering > 0.0 { scattering / (scattering + absorption) } else { 0.0 }
+        };
+        let (scattering, absorption) = match self.volume(medium) {
+            None => (medium.scattering, medium.absorption),
+            Some(volume) => {
+                let at = volume.coefficients(medium, p);
+                (at.scattering, at.absorption)
+            }
+        };
+        Rgb::new(of(scattering.r, absorption.r), of(scattering.g, absorption.g), of(scattering.b, absorption.b))
     }
 
     /// Whether something is where no surface of a medium is around a point.
@@ -258,8 +301,10 @@ impl Media {
         current.medium().or(self.around)
     }
 
-    /// These where a unit of length is `factor` of the unit so far.
-    pub fn rescale(&mut self, factor: f64) {
+    /// Moves media of the world to a render space.
+    pub fn place(&mut self, space: &RenderSpace) {
+        let factor = 1.0 / space.scale();
+        self.volumes.iter_mut().for_each(|volume| volume.place(space));
         for medium in &mut self.list {
             let coefficients = [&mut medium.absorption, &mut medium.scattering, &mut medium.emission];
             coefficients.into_iter().for_each(|c| *c = c.map(|c| (f64::from(c) * factor) as f32));
@@ -276,9 +321,15 @@ impl Media {
         self.list.iter().position(|m| m == medium).map(MediumId::new)
     }
 
-    /// What is left of light after a distance within `here`.
-    pub fn transmittance(&self, current: &MediumStack, distance: f32) -> Rgb {
-        self.at(current).map_or(Rgb::WHITE, |id| transmittance(self.get(id).extinction(), distance))
+    /// What is left of light along a ray within `current`: of what differs from place to place an unbiased estimate,
+    /// by chance.
+    pub fn transmittance(&self, current: &MediumStack, ray: &Ray, random: impl FnOnce() -> Rng) -> Rgb {
+        let Some(id) = self.at(current) else { return Rgb::WHITE };
+        let medium = self.get(id);
+        match self.volume(medium) {
+            None => transmittance(medium.extinction(), (ray.t_max - ray.t_min) * ray.direction.length()),
+            Some(volume) => volume.transmittance(medium, ray, &mut random()),
+        }
     }
 
     /// The relative index of refraction between the two sides of a surface, for one channel if it is chosen.

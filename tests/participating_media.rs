@@ -126,14 +126,14 @@ fn what_a_slab_gives_off_is_its_integral() {
 }
 
 /// Integral over `[0, 1]` by Simpson's rule.
-fn integral(f: impl Fn(f64) -> f64) -> f64 {
+pub fn integral(f: impl Fn(f64) -> f64) -> f64 {
     let n = 20_000;
     let weight = |i: i32| if i == 0 || i == n { 1.0 } else { f64::from(2 + 2 * (i % 2)) };
     (0..=n).map(|i| weight(i) * f(f64::from(i) / f64::from(n))).sum::<f64>() / (3.0 * f64::from(n))
 }
 
 /// Henyey and Greenstein's function of the cosine of the deflection.
-fn hg(g: f64, cos: f64) -> f64 {
+pub fn hg(g: f64, cos: f64) -> f64 {
     (1.0 - g * g) / (4.0 * PI * (1.0 + g * g - 2.0 * g * cos).powf(1.5))
 }
 
@@ -230,7 +230,7 @@ fn the_point_of_highest_priority_decides_what_scatters() {
     assert_means(&render(&scene), expected, "straight");
 }
 
-/// Fog in a box with a lamp, a ball of milk in glass and a floor.
+/// Fog in a box with a lamp, a ball of milk in glass, smoke and a floor.
 pub fn foggy(max_depth: u32) -> Value {
     json!({
         "film": { "width": 36, "height": 36, "filter": { "type": "box" } },
@@ -239,13 +239,21 @@ pub fn foggy(max_depth: u32) -> Value {
         "integrator": { "type": "path", "max_depth": max_depth },
         "media": {
             "fog": { "scattering": [0.1, 0.12, 0.15], "absorption": 0.01, "phase": henyey_greenstein(0.5) },
-            "milk": { "scattering": [4, 3, 2], "absorption": [0.01, 0.05, 0.1], "emission": [0, 0, 0.2] }
+            "milk": { "scattering": [4, 3, 2], "absorption": [0.01, 0.05, 0.1], "emission": [0, 0, 0.2] },
+            "smoke": {
+                "scattering": [9, 7, 5], "absorption": 1, "emission": [0.3, 0.1, 0],
+                "phase": { "type": "mix", "phases": [henyey_greenstein(0.6), { "type": "rayleigh" }], "weights": [2, 1] },
+                "volume": {
+                    "density": { "type": "noise", "resolution": [16, 12, 9], "frequency": [2, 2, 2] },
+                    "bounds": [[0.4, 0.1, -0.6], [1, 0.7, 0]]
+                }
+            }
         },
         "medium": "fog",
         "materials": {
             "grey": { "type": "diffuse" },
             "milk": { "type": "dielectric", "ior": 1.3, "medium": "milk" },
-            "cloud": { "type": "dielectric", "ior": 1, "medium": "milk", "priority": -1 }
+            "cloud": { "type": "dielectric", "ior": 1, "medium": "smoke", "priority": -1 }
         },
         "shapes": [
             { "type": "quad", "material": "grey", "origin": [-4, 0, 4], "edge_u": [8, 0, 0], "edge_v": [0, 0, -8] },

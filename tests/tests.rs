@@ -65,6 +65,8 @@ mod glassware;
 /// glTF files as they look: which way up images, normals and glass are.
 mod gltf_rendering;
 mod guiding;
+/// Media that differ from place to place, and distances chosen for lights.
+mod heterogeneous_media;
 /// Progress, logs, colours, configuration and manual pages.
 mod hygiene;
 /// What shapes, materials and instances are called in layers that pick them.

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use super::mtl_maps::take_maps;
-use super::{AssetError, Assets, MeshData, ObjMap, RgbImage};
+use super::{AssetError, Assets, MeshData, ObjMap, RgbImage, VolumeData};
 use crate::image_data::{ImageData, Samples};
 
 /// Whether a file is an OBJ by its extension.
@@ -66,6 +66,9 @@ impl Assets {
             hash.mesh(mesh);
         } else if let Some(image) = self.images.get(name) {
             hash.image(image);
+        } else if let Some(VolumeData { resolution, channels, values }) = self.volumes.get(name) {
+            hash.numbers(resolution.iter().chain([channels]).copied(), u32::to_le_bytes);
+            hash.numbers(values.iter().copied(), f32::to_le_bytes);
         } else {
             let RgbImage { width, height, pixels } = self.environments.get(name)?;
             hash.numbers([*width as u64, *height as u64], u64::to_le_bytes);

@@ -1,8 +1,8 @@
-//! Meshes and images that a reader made itself, for which there are no files.
+//! Meshes, images and volumes that a reader made itself, for which there are no files.
 
 use std::collections::BTreeMap;
 
-use super::{MeshData, RgbImage};
+use super::{MeshData, RgbImage, VolumeData};
 use crate::image_data::ImageData;
 
 /// What a scene names as if it were a file: looked up here before the folder of the scene is.
@@ -14,11 +14,16 @@ pub struct Assets {
     pub images: BTreeMap<String, ImageData>,
     /// Images of environments; such names end with `.exr`.
     pub environments: BTreeMap<String, RgbImage>,
+    /// Volumes; such names end with `.vol`.
+    pub volumes: BTreeMap<String, VolumeData>,
 }
 
 impl Assets {
     /// Whether there is an asset of this name.
     pub fn contains(&self, name: &str) -> bool {
-        self.meshes.contains_key(name) || self.images.contains_key(name) || self.environments.contains_key(name)
+        self.meshes.contains_key(name)
+            || self.images.contains_key(name)
+            || self.environments.contains_key(name)
+            || self.volumes.contains_key(name)
     }
 }

@@ -1,4 +1,4 @@
-//! Assets, which a scene names: meshes, images and light profiles, read from files to buffers that nobody has checked,
+//! Assets, which a scene names: meshes, images, volumes and light profiles, read from files to buffers that nobody has checked,
 //! or made by the reader of a scene format.
 
 mod environment_image;
@@ -14,6 +14,7 @@ mod obj_check;
 mod ply;
 mod ply_attributes;
 mod source;
+mod volume;
 
 pub use environment_image::{RgbImage, read_rgb_image};
 pub(crate) use fingerprint::{Hash, file_hashes, files_of_obj, is_obj};
@@ -25,6 +26,7 @@ pub use mtl_maps::{ObjMap, ObjMaps};
 pub use obj::{ObjMaterial, ObjMesh, read_obj};
 pub use ply::{read_ply, read_ply_attributes};
 pub use source::SceneSource;
+pub use volume::{VolHeader, VolumeData, read_raw_volume, read_vol, read_vol_header, vol_bytes};
 
 use std::path::{Path, PathBuf};
 

@@ -42,7 +42,7 @@ pub use glossy::Glossy;
 pub use lambert::{DiffuseDirection, Lambert};
 pub use microfacet::{Ggx, Microfacets, SMOOTH_ALPHA, SeparableGgx};
 pub use mirror::Mirror;
-pub use phase::Phase;
+pub use phase::{MAX_PHASE_LOBES, Phase, PhaseLobe, WeightedLobe};
 pub use phong::Phong;
 pub use plastic::Plastic;
 pub use principled::{Principled, PrincipledModel, PrincipledParameters};

@@ -70,7 +70,7 @@ impl MaterialTable {
             names: HashMap::new(),
             medium_of: HashMap::new(),
         };
-        let media = NamedMedia::new(files, desc)?;
+        let media = NamedMedia::new(files, desc, used)?;
         let compiler = Compiler { files, textures: &textures, media: &media };
         for name in desc.materials.keys() {
             let mut outer = Vec::new();
@@ -82,7 +82,8 @@ impl MaterialTable {
                 }
             }
         }
-        table.media = Media::new(table.medium_of.values().copied(), media.around(files, desc)?);
+        let around = media.around(files, desc)?;
+        table.media = Media::new(table.medium_of.values().copied(), around).with_volumes(media.volumes);
         table.textures = textures;
         Ok(table)
     }

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use super::CompileContext;
 use super::materials::{Compiler, MaterialTable};
-use crate::bsdf::Phase;
+use crate::bsdf::{MAX_PHASE_LOBES, Phase, PhaseLobe, WeightedLobe};
 use crate::color::Rgb;
-use crate::desc::{AbsorptionDesc, CoefficientDesc, MaterialDesc, MediumDesc, PhaseDesc, SceneDesc};
+use crate::desc::{AbsorptionDesc, CoefficientDesc, MaterialDesc, MediumDesc, PhaseDesc, SceneDesc, UsedNames};
 use crate::error::Result;
-use crate::id::{MaterialId, MediumId};
+use crate::id::{MaterialId, MediumId, VolumeId};
 use crate::material::Material;
-use crate::medium::{Medium, dispersed};
+use crate::medium::{Medium, Volume, dispersed};
 
 impl Compiler<'_> {
     /// What a material fills its surfaces with.
@@ -64,20 +64,31 @@ impl Compiler<'_> {
 }
 
 /// Media of the scene by name, of priority 0 and index 1.
-pub(super) struct NamedMedia<'a>(BTreeMap<&'a str, Medium>);
+pub(super) struct NamedMedia<'a> {
+    media: BTreeMap<&'a str, Medium>,
+    /// What differs within them, by [`VolumeId`].
+    pub volumes: Vec<Volume>,
+}
 
 impl<'a> NamedMedia<'a> {
-    pub fn new(files: &CompileContext, desc: &'a SceneDesc) -> Result<Self> {
-        let media = desc
-            .media
-            .iter()
-            .map(|(name, medium)| Ok((name.as_str(), participating(files, &format!("media.{name}"), medium)?)));
-        Ok(Self(media.collect::<Result<_>>()?))
+    /// All of a scene; what differs within those that are not used is not read.
+    pub fn new(files: &CompileContext, desc: &'a SceneDesc, used: &UsedNames) -> Result<Self> {
+        let mut all = Self { media: BTreeMap::new(), volumes: Vec::new() };
+        for (name, desc) in &desc.media {
+            let path = format!("media.{name}");
+            let mut medium = participating(files, &path, desc)?;
+            if let Some(volume) = desc.volume.as_ref().filter(|_| used.media.contains(name)) {
+                all.volumes.push(super::volumes::volume(files, &format!("{path}.volume"), volume, &medium)?);
+                medium.volume = Some(VolumeId::new(all.volumes.len() - 1));
+            }
+            all.media.insert(name, medium);
+        }
+        Ok(all)
     }
 
     /// The medium that `path` names.
     pub fn get(&self, files: &CompileContext, path: &str, name: &str) -> Result<Medium> {
-        self.0.get(name).copied().ok_or_else(|| files.unknown(path, "medium", name, self.0.keys().copied()))
+        self.media.get(name).copied().ok_or_else(|| files.unknown(path, "medium", name, self.media.keys().copied()))
     }
 
     /// What is around everything.
@@ -85,7 +96,8 @@ impl<'a> NamedMedia<'a> {
         let Some(name) = &desc.medium else { return Ok(None) };
         let medium = self.get(files, "medium", name)?;
         let [emission, extinction] = [medium.emission, medium.extinction()].map(Rgb::to_array);
-        if emission.into_iter().zip(extinction).any(|(e, t)| e > 0.0 && t == 0.0) {
+        let is_endless = medium.volume.is_none();
+        if is_endless && emission.into_iter().zip(extinction).any(|(e, t)| e > 0.0 && t == 0.0) {
             let message = "emits light but neither absorbs nor scatters it: all around, that is infinitely much";
             return Err(files.error("medium", message));
         }
@@ -94,13 +106,13 @@ impl<'a> NamedMedia<'a> {
 }
 
 /// The largest coefficient, per world unit.
-const MAX_COEFFICIENT: f32 = 1e15;
+pub(super) const MAX_COEFFICIENT: f32 = 1e15;
 
 /// The largest mean cosine of a phase function.
 const MAX_G: f32 = 0.99;
 
 fn participating(files: &CompileContext, path: &str, desc: &MediumDesc) -> Result<Medium> {
-    let MediumDesc { absorption, scattering, emission, phase } = desc;
+    let MediumDesc { absorption, scattering, emission, phase, volume: _ } = desc;
     let coefficient = |key: &str, desc: &CoefficientDesc| {
         let values = desc.to_array();
         if values.iter().all(|value| (0.0..=MAX_COEFFICIENT).contains(value)) {
@@ -110,14 +122,13 @@ fn participating(files: &CompileContext, path: &str, desc: &MediumDesc) -> Resul
         let message = format!("{values:?} must be from 0 to {MAX_COEFFICIENT:e}");
         Err(files.error(&format!("{path}.{key}"), message))
     };
-    let phase = match *phase {
-        PhaseDesc::Isotropic => Phase::ISOTROPIC,
-        PhaseDesc::HenyeyGreenstein { g } => {
-            files.within(&format!("{path}.phase.g"), f64::from(g), -f64::from(MAX_G), f64::from(MAX_G))?;
-            Phase::HenyeyGreenstein { g: g + 0.0 }
-        }
-        PhaseDesc::Rayleigh => Phase::Rayleigh,
-    };
+    let mut lobes = Vec::new();
+    let phase_path = format!("{path}.phase");
+    add_lobes(files, &phase_path, phase, 1.0, &mut lobes)?;
+    let phase = Phase::mean(&lobes).ok_or_else(|| {
+        let message = format!("must have from 1 to {MAX_PHASE_LOBES} phase functions of a weight above 0");
+        files.error(&phase_path, message)
+    })?;
     Ok(Medium {
         absorption: coefficient("absorption", absorption)?,
         scattering: coefficient("scattering", scattering)?,
@@ -125,6 +136,38 @@ fn participating(files: &CompileContext, path: &str, desc: &MediumDesc) -> Resul
         phase,
         ..Medium::clear(0)
     })
+}
+
+/// Adds the lobes of a phase function, which is a part `weight` of the whole.
+fn add_lobes(
+    files: &CompileContext,
+    path: &str,
+    desc: &PhaseDesc,
+    weight: f32,
+    lobes: &mut Vec<WeightedLobe>,
+) -> Result<()> {
+    let lobe = match desc {
+        PhaseDesc::Isotropic => PhaseLobe::HenyeyGreenstein { g: 0.0 },
+        PhaseDesc::HenyeyGreenstein { g } => {
+            files.within(&format!("{path}.g"), f64::from(*g), -f64::from(MAX_G), f64::from(MAX_G))?;
+            PhaseLobe::HenyeyGreenstein { g: g + 0.0 }
+        }
+        PhaseDesc::Rayleigh => PhaseLobe::Rayleigh,
+        PhaseDesc::Mix { phases, weights } => {
+            let sum: f32 = weights.iter().sum();
+            let are_sound = weights.iter().all(|weight| (0.0..=f32::MAX).contains(weight));
+            if weights.len() != phases.len() || !are_sound || !(sum > 0.0 && sum.is_finite()) {
+                let message = format!("{weights:?} must be one number of at least 0 for each of `phases`, one above 0");
+                return Err(files.error(&format!("{path}.weights"), message));
+            }
+            for (i, (phase, share)) in phases.iter().zip(weights).enumerate() {
+                add_lobes(files, &format!("{path}.phases[{i}]"), phase, weight * share / sum, lobes)?;
+            }
+            return Ok(());
+        }
+    };
+    lobes.push(WeightedLobe { weight, lobe });
+    Ok(())
 }
 
 impl MaterialTable {

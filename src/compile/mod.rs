@@ -27,6 +27,7 @@ mod shapes;
 mod summary;
 mod textures;
 mod transforms;
+mod volumes;
 
 pub use settings::{CheckedScene, check_film_and_integrator};
 pub use summary::Summary;
@@ -229,7 +230,7 @@ impl Builder {
     fn finish(mut self, desc: &SceneDesc, camera: crate::camera::Camera) -> Result<Scene> {
         let files = &self.files;
         if !self.space.is_world() {
-            self.materials.media.rescale(1.0 / self.space.scale());
+            self.materials.media.place(&self.space);
             for perturbation in &mut self.materials.normal_perturbations {
                 perturbation.rescale(self.space.scale());
             }

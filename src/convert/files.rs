@@ -6,7 +6,7 @@ use std::io::{BufWriter, Cursor, Read, Write};
 use std::path::{Path, PathBuf};
 
 use super::{Originals, folder_of, write_ply};
-use crate::assets::{Assets, RgbImage};
+use crate::assets::{Assets, RgbImage, vol_bytes};
 use crate::error::{Error, Result};
 use crate::file::{self, MARK, write_atomically};
 use crate::image_data::{ImageData, Samples};
@@ -203,6 +203,8 @@ impl<'a> AssetCopier<'a> {
             write_atomically(&place, |out| write_image(image, out))?;
         } else if let Some(image) = assets.environments.get(name) {
             write_atomically(&place, |out| write_environment(image, out))?;
+        } else if let Some(volume) = assets.volumes.get(name) {
+            write_atomically(&place, |out| out.write_all(&vol_bytes(volume)).map_err(|e| e.to_string()))?;
         }
         Ok(())
     }
@@ -238,6 +240,7 @@ fn check_kind(path: &Path, start: &[u8]) -> Result<()> {
         "PLY" => start.starts_with(b"ply"),
         "IES" => has_line("TILT=") || has_line("IESNA"),
         "PFM" => start.starts_with(b"PF") || start.starts_with(b"Pf"),
+        "VOL" => start.starts_with(b"VOL"),
         "SERIALIZED" => start.starts_with(&[0x1c, 0x04]),
         // These have no mark, but a kind of image and a depth from a short list.
         "TGA" => {

@@ -1,6 +1,6 @@
 //! The files that a scene names.
 
-use super::{LightDesc, SceneDesc, ShapeDesc, TextureDesc};
+use super::{LightDesc, SceneDesc, ShapeDesc, TextureDesc, VolumeDesc};
 
 /// A file that a scene names.
 #[derive(Debug)]
@@ -45,6 +45,14 @@ impl SceneDesc {
                     name: file,
                     is_used: used.textures.contains(name),
                 });
+            }
+        }
+        for (medium, desc) in &mut self.media {
+            for (key, part) in desc.volume.iter_mut().flat_map(|volume| volume.parts_mut()) {
+                if let VolumeDesc::Grid { file: Some(file), .. } = part {
+                    let path = format!("media.{medium}.volume.{key}.file");
+                    files.push(NamedFile { path, name: file, is_used: used.media.contains(medium) });
+                }
             }
         }
         for (i, light) in self.lights.iter_mut().enumerate() {

@@ -29,7 +29,7 @@ pub use material::{
     BumpMapDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, PhongLobeDesc, PlasticDesc,
     RangedDesc, RoughnessDesc, ScalarDesc,
 };
-pub use medium::{AbsorptionDesc, CoefficientDesc, MediumDesc, PhaseDesc};
+pub use medium::{AbsorptionDesc, BorderDesc, CoefficientDesc, MediumDesc, MediumVolumeDesc, PhaseDesc, VolumeDesc};
 pub use output::{CompressionDesc, CryptoManifestDesc, ExrProfileDesc, LayerKind, OutputDesc, PixelTypeDesc, ViewDesc};
 pub(crate) use principled::principled_parameters;
 pub use principled::{PrincipledDesc, PrincipledModelDesc};

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::{SceneDesc, ShapeDesc, TextureDesc};
 
-/// Names of objects, materials and textures that the world uses, directly or through others.
+/// Names of objects, materials, textures and media that the world uses, directly or through others.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct UsedNames {
     /// Objects with an instance in the world.
@@ -16,6 +16,8 @@ pub struct UsedNames {
     pub materials: BTreeSet<String>,
     /// Textures of those materials and shapes, and of lights.
     pub textures: BTreeSet<String>,
+    /// Media of those materials, and what is around everything.
+    pub media: BTreeSet<String>,
 }
 
 impl SceneDesc {
@@ -41,6 +43,7 @@ impl SceneDesc {
             common.opacity.into_iter().for_each(|opacity| self.use_words(opacity, &mut used));
         }
         self.lights.iter().for_each(|light| self.use_words(light, &mut used));
+        used.media.extend(self.medium.clone());
         used
     }
 
@@ -64,6 +67,9 @@ impl SceneDesc {
             && used.materials.insert(word.to_owned())
         {
             self.use_words(material, used);
+        }
+        if self.media.contains_key(word) {
+            used.media.insert(word.to_owned());
         }
         if let Some(texture) = self.textures.get(word)
             && used.textures.insert(word.to_owned())
@@ -126,6 +132,7 @@ mod tests {
             objects: names(&["inner", "outer"]),
             materials: names(&["top", "x", "y"]),
             textures: names(&["a", "b", "c", "e", "f", "g"]),
+            media: BTreeSet::new(),
         };
         assert_eq!(desc.used_names(), expected);
     }

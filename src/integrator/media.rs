@@ -1,11 +1,12 @@
 //! Paths through media: where the medium changes, and what is absorbed on the way.
 
 use super::World;
+use super::path::Arrival;
 use crate::bsdf::Bsdf;
 use crate::color::Rgb;
 use crate::geometry::{Hit, SurfaceInteraction};
 use crate::math::{Aabb, Ray, Vec3, vec3};
-use crate::medium::{BoundaryMedia, MediumStack, RelativeIor};
+use crate::medium::{BoundaryMedia, MediumStack, RelativeIor, random_of_ray};
 use crate::scene::Scene;
 
 /// Surfaces on one straight way, at most; a way along a surface must not go on for ever.
@@ -24,6 +25,10 @@ pub(super) struct MediaState {
     pub channel: Option<usize>,
     /// At a boundary between media: the index of refraction of the inside over that of the outside.
     pub ior: Option<f32>,
+    /// If its end is a point of a medium: the way there, if distances on it were chosen for lights.
+    pub arrival: Option<Arrival>,
+    /// The same for its last vertex.
+    pub departure: Option<Arrival>,
 }
 
 /// The part of a ray before the first surface that scatters: up to there it passes boundaries within one medium.
@@ -113,7 +118,7 @@ impl World<'_> {
 
     /// What is left of the light along a ray that meets nothing on its way, which lies within the media `current`.
     pub(super) fn transmittance(&self, current: &MediumStack, ray: &Ray) -> Rgb {
-        self.scene.media.transmittance(current, (ray.t_max - ray.t_min) * ray.direction.length())
+        self.scene.media.transmittance(current, ray, || random_of_ray(ray))
     }
 
     /// Follows `ray`, which has found `hit`, through all surfaces where light passes as if there were none.
@@ -127,8 +132,8 @@ impl World<'_> {
         let mut passed = 0;
         loop {
             let at = self.resolve(ray, hit);
-            let distance = at.as_ref().map_or(f32::INFINITY, |at| (at.t - ray.t_min) * ray.direction.length());
-            transmittance *= self.scene.media.transmittance(&state.current, distance);
+            let way = Ray { t_max: at.as_ref().map_or(f32::INFINITY, |at| at.t), ..*ray };
+            transmittance *= self.transmittance(&state.current, &way);
             let boundary = at.as_ref().and_then(|at| self.boundary(at, ray.direction, state));
             let ior = boundary.as_ref().map(|boundary| boundary.ior);
             let (Some(at), Some(boundary), true) =

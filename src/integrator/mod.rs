@@ -56,10 +56,16 @@ pub mod dimensions {
     /// Choice of a colour (one), where dispersion parts them.
     pub const COLOR: u32 = u32::MAX - 1;
 
-    /// Of path tracing: choice of a channel (one) and the distance to a scattering by media (one), on the segment with
-    /// this many bounces before it.
+    /// Of path tracing: choice of a channel (one) and the distance to a scattering by media (one), a distance for a
+    /// light (one) and the choice of that light (one), on the segment with this many bounces before it.
     pub const fn medium(bounce: u32) -> u32 {
         (1 << 31) + bounce
+    }
+
+    /// Of path tracing: a point of a light (two), the last digits of the light's choice (one) and what else is left to
+    /// chance (one), for a distance chosen on the segment with this many bounces before it.
+    pub const fn equiangular(bounce: u32) -> u32 {
+        (3 << 30) + bounce
     }
 
     /// Of path tracing: choice of a light (one, and one for its last digits) and a direction towards it (two), at the

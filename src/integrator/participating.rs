@@ -1,15 +1,16 @@
 //! Rays through media that scatter and emit light.
 //!
-//! Distances are sampled for one channel, which is chosen by what the path carries of each, and weighted by the balance
+//! Distances in what is the same everywhere are sampled for one channel, which is chosen by what the path carries of each, and weighted by the balance
 //! heuristic over all channels (Wilkie et al., "Hero Wavelength Spectral Sampling").
 
 use super::World;
 use super::media::{MAX_SURFACES, MediaState};
 use crate::color::Rgb;
-use crate::geometry::{Hit, SpawnPoint, SurfaceInteraction};
+use crate::geometry::{Hit, SpawnPoint};
 use crate::id::{MediumId, PrimId, ShapeId};
-use crate::math::Ray;
-use crate::medium::{Medium, RelativeIor, transmittance};
+use crate::light::Way;
+use crate::math::{Ray, Rng};
+use crate::medium::{Flight, Medium, RelativeIor, transmittance};
 
 /// What a path's ray meets first of media that scatter and of surfaces that are no mere boundaries within one medium.
 pub(super) struct MediumPath {
@@ -23,6 +24,27 @@ pub(super) struct MediumPath {
     pub passed: u32,
     /// At a boundary between media, the relative index of refraction.
     pub ior: Option<RelativeIor>,
+    /// The way to the first boundary or surface, if it is through a homogeneous medium that scatters.
+    pub first: Option<FirstSegment>,
+}
+
+/// A path's way through a homogeneous medium from where its ray starts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FirstSegment {
+    pub medium: MediumId,
+    /// To its first boundary or surface.
+    pub way: Way,
+    /// The share of each channel in the choice of one.
+    shares: [f32; 3],
+}
+
+impl FirstSegment {
+    /// Density of distances that follow the extinction.
+    pub fn pdf(&self, world: &World, distance: f32) -> f32 {
+        let extinction = world.scene.media.get(self.medium).extinction();
+        let Rgb { r, g, b } = transmittance(extinction, distance) * extinction * Rgb::from(self.shares);
+        r + g + b
+    }
 }
 
 /// Where a shadow ray goes.
@@ -38,20 +60,22 @@ pub(super) struct DistanceSample {
     /// The share of each channel in the choice.
     shares: [f32; 3],
     channel: usize,
-    /// Optical depth in that channel.
-    depth: f32,
+    /// With the optical depth in that channel.
+    flight: Flight,
+    /// The path's throughput.
+    carried: Rgb,
 }
 
 impl DistanceSample {
-    /// For a path of this throughput, `u` in the unit square.
-    pub fn new(throughput: Rgb, u: [f32; 2]) -> Self {
+    /// For a path of this throughput, `u` in the unit square; `random` is for what needs more numbers.
+    pub fn new(throughput: Rgb, u: [f32; 2], random: Rng) -> Self {
         let carried = throughput.map(|t| t.max(0.0));
         let sum = carried.r + carried.g + carried.b;
         let shares = if sum > 0.0 && sum.is_finite() { (carried / sum).to_array() } else { [1.0 / 3.0; 3] };
         // Rounding must not choose a channel of no share.
         let last = if shares[2] > 0.0 { 2 } else { usize::from(shares[1] > 0.0) };
         let channel = if u[0] < shares[0] { 0 } else { last.min(if u[0] < shares[0] + shares[1] { 1 } else { 2 }) };
-        Self { shares, channel, depth: -(-u[1]).ln_1p() }
+        Self { shares, channel, flight: Flight::new(u[1], random), carried: throughput }
     }
 }
 
@@ -82,17 +106,19 @@ impl World<'_> {
         let mut track = Track { value: Rgb::WHITE, pdf: Rgb::WHITE, shares: sample.shares.into() };
         let mut emitted = Rgb::BLACK;
         let mut passed = 0;
+        let mut first = None;
         loop {
             let at = self.resolve(ray, hit);
-            let distance = self.distance(ray, at.as_ref());
             if let Some(id) = self.scene.media.at(&state.current) {
-                let medium = self.scene.media.get(id);
-                if !medium.emission.is_black() {
-                    emitted += track.weight() * medium.emitted(distance);
+                let way = Ray { t_max: at.as_ref().map_or(ray.t_max, |at| at.t), ..*ray };
+                if passed == 0 {
+                    first = self.first_segment(id, &way, &sample);
                 }
-                if let Some(distance) = travel(medium, distance, &mut sample, &mut track) {
-                    let hit = Some(scattering_at(id, ray.t_min + distance / ray.direction.length()));
-                    return MediumPath { hit, weight: track.weight(), emitted, passed, ior: None };
+                let segment = self.travel(id, &way, &mut sample, &mut track);
+                emitted += segment.emitted;
+                if let Some(t) = segment.t {
+                    let hit = Some(scattering_at(id, t));
+                    return MediumPath { hit, weight: track.weight(), emitted, passed, ior: None, first };
                 }
             }
             let boundary = at.as_ref().and_then(|at| self.boundary(at, ray.direction, state));
@@ -100,7 +126,7 @@ impl World<'_> {
             let (Some(at), Some(boundary), true) =
                 (at, boundary, ior.is_some_and(|ior| ior.is_one()) && passed < MAX_SURFACES)
             else {
-                return MediumPath { hit, weight: track.weight(), emitted, passed, ior };
+                return MediumPath { hit, weight: track.weight(), emitted, passed, ior, first };
             };
             state.current = boundary.sides.beyond(ray.direction.dot(at.n_g) < 0.0);
             *ray = at.spawn(ray.direction);
@@ -111,12 +137,19 @@ impl World<'_> {
 
     /// What is left of the light along a shadow ray within the media `state`, which only boundaries within one medium
     /// do not block; with the number of rays traced.
-    pub(super) fn light_transmittance(&self, ray: &Ray, end: &ShadowEnd, mut state: MediaState) -> (Rgb, u64) {
+    pub(super) fn light_transmittance(
+        &self,
+        ray: &Ray,
+        end: &ShadowEnd,
+        mut state: MediaState,
+        random: &mut Rng,
+    ) -> (Rgb, u64) {
         let mut ray = *ray;
         let mut left = Rgb::WHITE;
         for passed in 0..=MAX_SURFACES {
             let at = self.closest(&ray);
-            left *= self.scene.media.transmittance(&state.current, self.distance(&ray, at.as_ref()));
+            let way = Ray { t_max: at.as_ref().map_or(ray.t_max, |at| at.t), ..ray };
+            left *= self.scene.media.transmittance(&state.current, &way, || Rng::new(random.bits()));
             let traced = u64::from(passed) + 1;
             let Some(at) = at.filter(|_| !left.is_black()) else { return (left, traced) };
             let boundary = self.boundary(&at, ray.direction, &state).filter(|boundary| boundary.ior.is_one());
@@ -130,10 +163,42 @@ impl World<'_> {
         (Rgb::BLACK, u64::from(MAX_SURFACES) + 1)
     }
 
-    /// From the start of a ray to a surface that it meets, or to its end.
-    fn distance(&self, ray: &Ray, at: Option<&SurfaceInteraction>) -> f32 {
-        (at.map_or(ray.t_max, |at| at.t) - ray.t_min) * ray.direction.length()
+    fn first_segment(&self, id: MediumId, ray: &Ray, sample: &DistanceSample) -> Option<FirstSegment> {
+        let medium = self.scene.media.get(id);
+        if medium.scattering.is_black() || medium.volume.is_some() {
+            return None;
+        }
+        let (direction, length) = (ray.direction, ray.direction.length());
+        let way = Way {
+            origin: ray.origin.as_dvec3() + direction.as_dvec3() * f64::from(ray.t_min),
+            direction: direction / length,
+            length: (ray.t_max - ray.t_min) * length,
+        };
+        Some(FirstSegment { medium: id, way, shares: sample.shares })
     }
+
+    /// Goes through a medium to the end of a ray, or to where it scatters.
+    fn travel(&self, id: MediumId, ray: &Ray, sample: &mut DistanceSample, track: &mut Track) -> Segment {
+        let medium = self.scene.media.get(id);
+        let before = track.weight();
+        if let Some(volume) = self.scene.media.volume(medium) {
+            let tracked = volume.track(medium, ray, sample.carried * before, &mut sample.flight);
+            track.value *= tracked.weight;
+            return Segment { t: tracked.t, emitted: before * tracked.emitted };
+        }
+        let distance = (ray.t_max - ray.t_min) * ray.direction.length();
+        let emitted = if medium.emission.is_black() { Rgb::BLACK } else { before * medium.emitted(distance) };
+        let scattered = travel(medium, distance, sample, track);
+        Segment { t: scattered.map(|distance| ray.t_min + distance / ray.direction.length()), emitted }
+    }
+}
+
+/// A path's way through one medium.
+struct Segment {
+    /// Where on the ray it is scattered, if it is.
+    t: Option<f32>,
+    /// Radiance emitted towards the start of the path's ray.
+    emitted: Rgb,
 }
 
 /// A point of a medium in place of a surface's.
@@ -149,7 +214,7 @@ fn travel(medium: &Medium, distance: f32, sample: &mut DistanceSample, track: &m
         return None;
     }
     let of_channel = extinction.to_array()[sample.channel];
-    let free = if of_channel > 0.0 { sample.depth / of_channel } else { f32::INFINITY };
+    let free = if of_channel > 0.0 { sample.flight.depth / of_channel } else { f32::INFINITY };
     if free < distance {
         let left = transmittance(extinction, free);
         track.value *= left * medium.scattering;
@@ -157,7 +222,7 @@ fn travel(medium: &Medium, distance: f32, sample: &mut DistanceSample, track: &m
         return Some(free);
     }
     if of_channel > 0.0 {
-        sample.depth = (sample.depth - of_channel * distance).max(0.0);
+        sample.flight.depth = (sample.flight.depth - of_channel * distance).max(0.0);
     }
     let left = transmittance(extinction, distance);
     track.value *= left;

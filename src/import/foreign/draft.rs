@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::{ImportReport, Imported, Outcome, ReportEntry};
-use crate::assets::{Assets, MeshData, RgbImage};
+use crate::assets::{Assets, MeshData, RgbImage, VolumeData};
 use crate::desc::{
     CameraDesc, InstanceDesc, KeyframeDesc, LightDesc, MaterialDesc, MediumDesc, ObjectDesc, SceneDesc, ShapeDesc,
     TextureDesc, TransformDesc, TransformStepDesc,
@@ -142,6 +142,13 @@ impl Draft {
     pub fn keep_environment(&mut self, name: &str, image: RgbImage) -> String {
         let file = self.numbers.unique_file(name, "exr", &self.assets);
         self.assets.environments.insert(file.clone(), image);
+        file
+    }
+
+    /// Keeps a volume that has no file; the result is used in place of its file's name.
+    pub fn keep_volume(&mut self, name: &str, volume: VolumeData) -> String {
+        let file = self.numbers.unique_file(name, "vol", &self.assets);
+        self.assets.volumes.insert(file.clone(), volume);
         file
     }
 

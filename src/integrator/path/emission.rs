@@ -2,6 +2,7 @@
 
 use super::Context;
 use super::caustics::CausticState;
+use super::equiangular::{Arrival, DirectionPdfs};
 use super::radiance::Output;
 use super::wave::{PathRows, Wave};
 use crate::color::Rgb;
@@ -40,13 +41,14 @@ pub(super) fn bsdf_mis_weight(
 
 /// Adds the light of emitters at a block's vertices.
 pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Output) {
-    let Wave { vertices, paths, rays, light_aovs, caustics, .. } = &*wave;
+    let Wave { vertices, paths, rays, light_aovs, caustics, media, .. } = &*wave;
     let (paths, rays) = (&paths[block], &rays[block]);
     for &lane in &vertices.emitters {
         let lane = usize::from(lane);
         let i = vertices.path(lane);
         let at = vertices.interaction(lane);
-        let met = Met { paths, i, ray: rays.get(i), caustic: caustics.get(block * BATCH + i) };
+        let departure = media.get(block * BATCH + i).and_then(|state| state.departure.as_ref());
+        let met = Met { paths, i, ray: rays.get(i), caustic: caustics.get(block * BATCH + i), departure };
         let Some((id, radiance)) = met.emitted(context, &at) else { continue };
         let light = context.config.clamped(paths.throughput.get(i) * radiance, context.bounce);
         if light.is_black() {
@@ -66,12 +68,13 @@ struct Met<'a> {
     i: usize,
     ray: Ray,
     caustic: Option<&'a CausticState>,
+    departure: Option<&'a Arrival>,
 }
 
 impl Met<'_> {
     /// The light of the surface with what it emits against the ray, weighted by MIS; `None` if it is no emitter.
     fn emitted(&self, context: &Context, at: &SurfaceInteraction) -> Option<(LightId, Rgb)> {
-        let Self { paths, i, ray, caustic } = self;
+        let Self { paths, i, ray, caustic, departure } = self;
         let scene = context.scene;
         let id = scene.surface(at.shape).light(at.prim)?;
         let Light::Area(light) = scene.lights.get(id) else { return None };
@@ -82,6 +85,11 @@ impl Met<'_> {
         let light_pdf = |from: &LightSampleContext| {
             light.pdf(&scene.geometry, from.p, ray, at) * scene.lights.pmf(id, from, context.compensation)
         };
-        Some((id, radiance * bsdf_mis_weight(context, paths, *i, *caustic, light_pdf)))
+        let mut weight = bsdf_mis_weight(context, paths, *i, *caustic, light_pdf);
+        if let Some(arrival) = departure {
+            let light = light.pdf(&scene.geometry, paths.from(*i).p, ray, at);
+            weight *= arrival.share(context, id, DirectionPdfs { light, phase: paths.pdf[*i] });
+        }
+        Some((id, radiance * weight))
     }
 }

@@ -2,16 +2,20 @@
 
 use super::Context;
 use super::block::{Vertices, spawn};
+use super::equiangular::{self, Arrival, DirectionPdfs, OnTheWay};
 use super::radiance::Output;
 use super::wave::{PathRows, Wave, path_flags};
 use crate::color::Rgb;
-use crate::integrator::dimensions;
+use crate::geometry::Hit;
+use crate::id::LightId;
 use crate::integrator::light_events::LightEvent;
 use crate::integrator::media::MediaState;
 use crate::integrator::participating::{DistanceSample, ShadowEnd};
+use crate::integrator::{Strategy, dimensions};
 use crate::light::light_target;
+use crate::math::random::hash64;
 use crate::math::rows::BATCH;
-use crate::math::{Ray, RayCone, RayRows};
+use crate::math::{Ray, RayCone, RayRows, Rng};
 use crate::medium::RelativeIor;
 use crate::sampling::PixelSeed;
 
@@ -63,6 +67,19 @@ fn arrive(context: &Context, paths: &mut PathRows, i: usize, state: &mut MediaSt
     state.ior = ior.map(|ior| ior.of(state.channel));
 }
 
+/// What random numbers beyond those of the sampler are for.
+#[derive(Clone, Copy)]
+enum Purpose {
+    Distance,
+    Shadow,
+}
+
+/// Random numbers of a segment of a path.
+fn random(context: &Context, seed: u32, sample: u32, purpose: Purpose) -> Rng {
+    let path = hash64(u64::from(seed) << 32 | u64::from(sample));
+    Rng::new(hash64(path ^ (u64::from(context.bounce) << 8 | purpose as u64)))
+}
+
 /// Takes every path to the next point of a medium or surface that scatters it, and adds what media emit on the way;
 /// the result is how many more rays that took.
 #[inline(never)]
@@ -79,9 +96,17 @@ pub(super) fn scatter(context: &Context, wave: &mut Wave, out: &mut Output) -> u
             paths.sample[i],
             dimensions::medium(context.bounce),
         );
-        let sample = DistanceSample::new(throughput, [u[0], u[1]]);
+        let random = random(context, paths.seed[i], paths.sample[i], Purpose::Distance);
+        let sample = DistanceSample::new(throughput, [u[0], u[1]], random);
+        let before = *state;
         let path = context.world.trace_through_media(&mut ray, hits[block].get(i), state, sample);
         hits[block].set(i, path.hit);
+        let first = path.first.filter(|_| equiangular::is_enabled(context));
+        let is_first = path.passed == 0 && path.hit.is_some_and(|hit| hit.instance == Hit::MEDIUM);
+        state.arrival = first.filter(|_| is_first).map(|segment| {
+            let t = path.hit.map_or(0.0, |hit| hit.t);
+            Arrival { segment, distance: (t - ray.t_min) * ray.direction.length() }
+        });
         if !path.emitted.is_black() {
             let light = context.config.clamped(throughput * path.emitted, context.bounce);
             let event = light_aovs.event(context.bounce, index, LightEvent::Emission);
@@ -94,6 +119,19 @@ pub(super) fn scatter(context: &Context, wave: &mut Wave, out: &mut Output) -> u
             move_ray(&mut rays[block], cones, index, &ray);
         }
         arrive(context, paths, i, state, path.ior);
+        if let Some(segment) = first {
+            let on_the_way = OnTheWay {
+                index,
+                slot: paths.slot[i],
+                seed: paths.seed[i],
+                sample: paths.sample[i],
+                throughput,
+                state: &before,
+                time: ray.time,
+                u: [u[2], u[3]],
+            };
+            wave.counts.shadow += equiangular::add(context, wave, &on_the_way, &segment, out);
+        }
     }
     passed
 }
@@ -113,15 +151,28 @@ pub(super) fn trace_shadow_rays(context: &Context, vertices: &mut Vertices, medi
             light_target::POINT => ShadowEnd::Point(&target),
             _ => ShadowEnd::Infinity,
         };
-        let (left, rays) = context.world.light_transmittance(&ray, &end, state);
+        let mut random = random(context, vertices.rows.seed[lane], vertices.rows.sample[lane], Purpose::Shadow);
+        let (left, rays) = context.world.light_transmittance(&ray, &end, state, &mut random);
         traced += rays;
+        let share = direct_share(context, vertices, lane, &state);
         let direct = &mut vertices.direct;
-        direct.contribution.set(lane, direct.contribution.get(lane) * left);
+        direct.contribution.set(lane, direct.contribution.get(lane) * left * share);
         if left.is_black() {
             direct.status[lane] = spawn::NONE;
         }
     }
     traced
+}
+
+/// The share of a vertex's light sample in what arrives there, against that of distances chosen for lights.
+fn direct_share(context: &Context, vertices: &Vertices, lane: usize, state: &MediaState) -> f32 {
+    let (Some(arrival), true) = (&state.arrival, vertices.is_medium(lane)) else { return 1.0 };
+    let lights = &vertices.light_samples;
+    let id = LightId(lights.light[lane]);
+    let pmf = context.scene.lights.pmf(id, &vertices.light_context(lane), context.compensation);
+    let is_mis = context.config.strategy == Strategy::Mis && lights.is_delta[lane] == 0;
+    let phase = if is_mis { vertices.direct.scatter_pdf[lane] } else { 0.0 };
+    arrival.share(context, id, DirectionPdfs { light: lights.pdf[lane] / pmf, phase })
 }
 
 /// The shadow ray of a vertex, and the media at its start.
@@ -162,6 +213,8 @@ pub(super) fn after(context: &Context, vertices: &Vertices, lane: usize, state: 
     let to = vertices.scatter.direction.get(lane);
     MediaState {
         current: context.world.media_toward(&at, vertices.rows.direction.get(lane), to, &state.current),
+        arrival: None,
+        departure: state.arrival,
         ..*state
     }
 }

@@ -11,6 +11,7 @@ mod caustics;
 mod continuations;
 mod direct;
 mod emission;
+mod equiangular;
 mod guided;
 mod light_aovs;
 mod materials;
@@ -36,6 +37,7 @@ use crate::film::LightAovRequest;
 use crate::light::MisCompensation;
 use crate::sampling::Sampler;
 use crate::scene::Scene;
+pub(super) use equiangular::Arrival;
 use radiance::Output;
 use wave::Wave;
 

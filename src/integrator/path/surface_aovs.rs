@@ -58,7 +58,7 @@ fn write_surfaces(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
 
 /// Sets the AOVs of a point where a medium scatters: it has no normal, no shape and no parameters.
 fn set_medium(context: &Context, surface: &mut SurfaceSample, at: &SurfaceInteraction, features: Option<Rgb>) {
-    let albedo = context.scene.media.get(MediumId(at.shape.0)).albedo();
+    let albedo = context.scene.media.albedo(MediumId(at.shape.0), at.p);
     if context.bounce == 0 {
         *surface = medium_aovs(context.pass, context.config.surface_aovs, at);
         surface.albedo = albedo;

@@ -10,7 +10,7 @@ use crate::error::Result;
 /// The largest mean cosine of a phase function.
 const MAX_G: f64 = 0.99;
 
-const UNSUPPORTED: &str = "only homogeneous participating media are supported: left out";
+const UNSUPPORTED: &str = "only homogeneous and heterogeneous participating media are supported: left out";
 
 const UNSEEN: &str = "the integrator shows no participating media: left out";
 
@@ -53,16 +53,24 @@ impl<'a> Reader<'a> {
         if let Some(name) = self.media.get(&id) {
             return Ok(name.clone());
         }
-        if self.document.plugins[id.0].kind != "homogeneous" {
+        if !matches!(self.document.plugins[id.0].kind.as_str(), "homogeneous" | "heterogeneous") {
             self.whole(id, UNSUPPORTED);
             self.media.insert(id, None);
             return Ok(None);
         }
         let mut element = Element::new(self.document, id);
         let scale = element.float("scale")?.unwrap_or(1.0) as f32;
-        let albedo = self.coefficient(&mut element, "albedo")?.unwrap_or([0.75; 3]).map(|a| a.clamp(0.0, 1.0));
-        let extinction = self.coefficient(&mut element, "sigma_t")?.unwrap_or([1.0; 3]).map(|t| t * scale);
-        let emission = self.coefficient(&mut element, "emission")?.unwrap_or([0.0; 3]);
+        let grids = if element.kind() == "heterogeneous" { self.grids(&mut element)? } else { None };
+        let (has_albedo, has_extinction) = grids.as_ref().map_or((false, false), |g| (g.has_albedo, g.has_extinction));
+        let mut coefficient = |name: &str, is_grid: bool, default: f32| {
+            let value = if is_grid { Some([1.0; 3]) } else { self.coefficient(&mut element, name)? };
+            Ok::<_, crate::Error>(value.unwrap_or([default; 3]))
+        };
+        let albedo = coefficient("albedo", has_albedo, 0.75)?.map(|a| a.clamp(0.0, 1.0));
+        let extinction = coefficient("sigma_t", has_extinction, 1.0)?.map(|t| t * scale);
+        let emission = coefficient("emission", false, 0.0)?;
+        // Decides how distances are sampled.
+        element.boolean("has_spectral_extinction", true)?;
         let has_emission = emission != [0.0; 3];
         // How lights are sampled does not change the picture.
         element.boolean("sample_emitters", true)?;
@@ -76,6 +84,7 @@ impl<'a> Reader<'a> {
             scattering: of(&|i| extinction[i] * albedo[i]),
             emission: if has_emission { of(&|i| emission[i] * scale) } else { CoefficientDesc::default() },
             phase,
+            volume: grids.map(|grids| Box::new(grids.volume)),
         };
         let name = if element.plugin.id.is_empty() { "medium" } else { &element.plugin.id };
         let name = self.draft.add_medium(name, &element.place().to_string(), desc);
@@ -92,7 +101,7 @@ impl<'a> Reader<'a> {
         let volume = self.document.plugin_of(property)?.filter(|id| self.document.plugins[id.0].class == "volume");
         let Some(id) = volume else { return self.constant(element, name, UvOrigin::Mitsuba) };
         if self.document.plugins[id.0].kind != "constvolume" {
-            element.ignored(name, "a homogeneous medium is the same everywhere");
+            element.ignored(name, "unsupported volume: the default in its place");
             return Ok(None);
         }
         let mut volume = Element::new(self.document, id);
@@ -103,10 +112,12 @@ impl<'a> Reader<'a> {
     }
 
     fn phase(&mut self, id: PluginId) -> Result<PhaseDesc> {
+        self.guard(id)?;
         let mut element = Element::new(self.document, id);
         let phase = match element.kind() {
             "isotropic" => PhaseDesc::Isotropic,
             "rayleigh" => PhaseDesc::Rayleigh,
+            "blendphase" => self.blend_phases(&mut element)?,
             "hg" => {
                 let g = element.float("g")?.unwrap_or(0.8);
                 if g.abs() > MAX_G {
@@ -120,7 +131,27 @@ impl<'a> Reader<'a> {
             }
         };
         element.finish(&mut self.draft);
+        self.open.pop();
         Ok(phase)
+    }
+
+    /// The mean of two phase functions by a weight, which is that of the second.
+    fn blend_phases(&mut self, element: &mut Element<'a>) -> Result<PhaseDesc> {
+        let phases = element.all("phase")?;
+        if phases.len() != 2 {
+            let found = phases.len();
+            return Err(element.place().error(format!("a blendphase needs two phase functions, not {found}")));
+        }
+        let weight = match self.coefficient(element, "weight")? {
+            Some([r, g, b]) => ((r + g + b) / 3.0).clamp(0.0, 1.0),
+            None if element.take("weight").is_some() => {
+                element.approximated("weight", "0.5 everywhere");
+                0.5
+            }
+            None => return Err(element.place().error("a blendphase needs \"weight\"")),
+        };
+        let phases = phases.into_iter().map(|(id, _)| self.phase(id)).collect::<Result<_>>()?;
+        Ok(PhaseDesc::Mix { phases, weights: vec![1.0 - weight, weight] })
     }
 
     /// The material of a surface between media, whose BSDF has become `material`; `None` where media change nothing.

@@ -21,6 +21,7 @@ mod textures;
 mod transforms;
 mod tree;
 mod values;
+mod volumes;
 mod xml;
 
 #[cfg(test)]

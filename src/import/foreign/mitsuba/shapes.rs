@@ -23,7 +23,7 @@ struct Form {
 }
 
 /// A map as the scene description has it.
-fn steps(map: &DAffine3) -> TransformDesc {
+pub(super) fn steps(map: &DAffine3) -> TransformDesc {
     if *map == DAffine3::IDENTITY {
         TransformDesc::default()
     } else {

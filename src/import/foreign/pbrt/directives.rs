@@ -9,7 +9,7 @@ use super::camera::{self, CameraDirective};
 use super::colors::{ColorSpace, Colors};
 use super::lights::Lights;
 use super::materials::Materials;
-use super::media::{MediumInterface, MediumTable};
+use super::media::{MediumDirective, MediumInterface, MediumTable};
 use super::options::{self, Typed};
 use super::params::{Params, Values};
 use super::shapes::{Directive, Shapes};
@@ -219,7 +219,9 @@ impl Reader {
                 let params =
                     params.with_defaults(self.graphics.attributes.get("medium").map_or(&[][..], Vec::as_slice));
                 let colors = Colors { folder: &self.folder, space: self.graphics.color_space };
-                self.media.define(&mut self.draft, &name, &params, &colors)?;
+                let (transform, motion) = self.world.place(&self.graphics.ctm, crate::math::DAffine3::IDENTITY);
+                let medium = MediumDirective { name: &name, params: &params, colors: &colors, transform, motion };
+                self.media.define(&mut self.draft, &medium)?;
             }
             "Material" | "MakeNamedMaterial" | "NamedMaterial" => self.material(lexer, at, directive)?,
             "Texture" => self.texture(lexer, at)?,

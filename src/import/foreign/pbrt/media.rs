@@ -6,7 +6,7 @@ use super::colors::{Colors, Meaning};
 use super::directives::quoted;
 use super::params::Params;
 use super::tokens::{Lexer, Position, TokenKind};
-use crate::desc::{CoefficientDesc, DielectricDesc, MaterialDesc, MediumDesc, PhaseDesc};
+use crate::desc::{CoefficientDesc, DielectricDesc, KeyframeDesc, MaterialDesc, MediumDesc, PhaseDesc, TransformDesc};
 use crate::error::Result;
 use crate::import::foreign::Draft;
 
@@ -32,6 +32,17 @@ impl MediumInterface {
     }
 }
 
+/// A medium's name, parameters and place.
+#[derive(Debug)]
+pub struct MediumDirective<'a> {
+    pub name: &'a str,
+    pub params: &'a Params,
+    pub colors: &'a Colors<'a>,
+    /// Of the medium's own space.
+    pub transform: TransformDesc,
+    pub motion: Vec<KeyframeDesc>,
+}
+
 /// The media of a scene.
 #[derive(Debug, Default)]
 pub struct MediumTable {
@@ -48,22 +59,35 @@ pub struct MediumTable {
 
 impl MediumTable {
     /// Reads a medium.
-    pub fn define(&mut self, draft: &mut Draft, name: &str, params: &Params, colors: &Colors) -> Result<()> {
+    pub fn define(&mut self, draft: &mut Draft, medium: &MediumDirective) -> Result<()> {
+        let MediumDirective { name, params, colors, .. } = *medium;
         let kind = params.string("type")?.unwrap_or("homogeneous");
-        if kind != "homogeneous" {
-            let why = "only homogeneous media are supported: left out";
+        if !matches!(kind, "homogeneous" | "uniformgrid" | "rgbgrid") {
+            let why = match kind {
+                "nanovdb" => "NanoVDB files are not supported: left out",
+                _ => "only homogeneous media, uniformgrid and rgbgrid are supported: left out",
+            };
             draft.ignored(&params.place, &params.element, "", why);
             self.names.insert(name.into(), None);
             return Ok(());
         }
         let scale = params.number_or("scale", 1.0)? as f32;
+        let is_rgb_grid = kind == "rgbgrid";
         let coefficient = |name: &str| -> Result<[f32; 3]> {
-            Ok(colors.get(params, name, Meaning::Number)?.unwrap_or([1.0; 3]).map(|c| c.max(0.0) * scale))
+            let given = if is_rgb_grid { None } else { colors.get(params, name, Meaning::Number)? };
+            Ok(given.unwrap_or([1.0; 3]).map(|c| c.max(0.0) * scale))
         };
         let (absorption, scattering) = (coefficient("sigma_a")?, coefficient("sigma_s")?);
+        let volume = match kind {
+            "uniformgrid" => Some(medium.uniform_grid(draft)?),
+            "rgbgrid" => Some(medium.rgb_grid(draft)?),
+            _ => None,
+        };
         params.ignore("preset", "measured media are not known: the coefficients of the file or 1");
-        let brightness = params.number_or("Lescale", 1.0)? as f32;
-        let radiance = colors.get(params, "Le", Meaning::Emission)?.unwrap_or([0.0; 3]);
+        let is_grid = volume.is_some();
+        let brightness = if is_grid { 1.0 } else { params.number_or("Lescale", 1.0)? as f32 };
+        let radiance = if is_rgb_grid { None } else { colors.get(params, "Le", Meaning::Emission)? };
+        let radiance = radiance.unwrap_or([0.0; 3]);
         let emission = [0, 1, 2].map(|i| radiance[i].max(0.0) * brightness * absorption[i]);
         let g = params.number_or("g", 0.0)?;
         if g.abs() > MAX_G {
@@ -76,7 +100,7 @@ impl MediumTable {
         };
         let [absorption, scattering, emission] = [absorption, scattering, emission].map(CoefficientDesc::Rgb);
         let emission = if emission == CoefficientDesc::Rgb([0.0; 3]) { CoefficientDesc::default() } else { emission };
-        let desc = MediumDesc { absorption, scattering, emission, phase };
+        let desc = MediumDesc { absorption, scattering, emission, phase, volume: volume.map(Box::new) };
         params.report(draft);
         let added = draft.add_medium(name, &params.place, desc);
         self.names.insert(name.into(), Some(added));

@@ -18,6 +18,7 @@ mod textures;
 mod tokens;
 mod transforms;
 mod triangles;
+mod volumes;
 
 #[cfg(test)]
 mod tests;
