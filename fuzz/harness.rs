@@ -48,6 +48,18 @@ pub fn read(kind: &str, data: &[u8], folder: &Path) {
             let extension = if data.starts_with(b"P") { "pfm" } else { "hdr" };
             let _ = assets::read_rgb_image(&write(&format!("i.{extension}"), data));
         }
+        "volume" => {
+            let path = write("v.vol", data);
+            let header = assets::read_vol_header(&path);
+            if let Ok(volume) = assets::read_vol(&path) {
+                let header = header.expect("the header was read");
+                assert_eq!((header.resolution, header.channels), (volume.resolution, volume.channels));
+                let voxels: usize = volume.resolution.iter().map(|&edge| edge as usize).product();
+                assert_eq!(volume.values.len(), voxels * volume.channels as usize);
+                assert_eq!(assets::vol_bytes(&volume).len(), data.len());
+            }
+            let _ = assets::read_raw_volume(&path, [2, 2, 2], 1);
+        }
         "mitsuba_xml" => read_scene(&write("s.xml", data)),
         "pbrt" => read_scene(&write("s.pbrt", data)),
         "gltf" => {

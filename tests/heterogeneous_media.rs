@@ -230,7 +230,7 @@ fn fog_around_a_spot_is_the_quadrature() {
             "medium": "fog",
             "lights": [{
                 "type": "spot", "position": [side, 0, -ahead], "look_at": [side + axis[0], 0, -ahead + axis[2]],
-                "intensity": [2, 2, 2], "cutoff_degrees": 50, "beam_degrees": 0
+                "intensity": [2, 2, 2], "cutoff_angle_degrees": 50, "beam_angle_degrees": 0
             }]
         }),
     );
@@ -351,7 +351,12 @@ fn volumes_that_make_no_sense() {
         (at, json!({ "type": "grid", "resolution": [1, 1, 1] }), at, "either `file` or `values`"),
         (at, json!({ "type": "grid", "file": "a.vdb" }), "media.fog.volume.density.file", "OpenVDB"),
         (at, json!({ "type": "grid", "resolution": [1, 1, 1], "channels": 3, "values": [1, 1, 1] }), at, "one number"),
-        (at, json!({ "type": "noise", "resolution": [100000, 100000, 100000] }), at, "at most"),
+        (
+            at,
+            json!({ "type": "noise", "resolution": [100_000, 100_000, 100_000] }),
+            "media.fog.volume.density.resolution",
+            "at most",
+        ),
         (at, json!({ "type": "noise", "frequency": [0, 1, 1] }), "media.fog.volume.density.frequency[0]", "0"),
         (at, json!({ "type": "noise", "octaves": 99 }), "media.fog.volume.density.octaves", "99"),
         ("media.fog.volume", flat, "media.fog.volume.bounds", "flat"),

@@ -242,7 +242,9 @@ pub fn foggy(max_depth: u32) -> Value {
             "milk": { "scattering": [4, 3, 2], "absorption": [0.01, 0.05, 0.1], "emission": [0, 0, 0.2] },
             "smoke": {
                 "scattering": [9, 7, 5], "absorption": 1, "emission": [0.3, 0.1, 0],
-                "phase": { "type": "mix", "phases": [henyey_greenstein(0.6), { "type": "rayleigh" }], "weights": [2, 1] },
+                "phase": {
+                    "type": "mix", "phases": [henyey_greenstein(0.6), { "type": "rayleigh" }], "weights": [2, 1]
+                },
                 "volume": {
                     "density": { "type": "noise", "resolution": [16, 12, 9], "frequency": [2, 2, 2] },
                     "bounds": [[0.4, 0.1, -0.6], [1, 0.7, 0]]

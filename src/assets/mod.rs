@@ -1,5 +1,5 @@
-//! Assets, which a scene names: meshes, images, volumes and light profiles, read from files to buffers that nobody has checked,
-//! or made by the reader of a scene format.
+//! Assets, which a scene names: meshes, images, volumes and light profiles, read from files to buffers that nobody has
+//! checked, or made by the reader of a scene format.
 
 mod environment_image;
 mod fingerprint;

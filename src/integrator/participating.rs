@@ -1,7 +1,8 @@
 //! Rays through media that scatter and emit light.
 //!
-//! Distances in what is the same everywhere are sampled for one channel, which is chosen by what the path carries of each, and weighted by the balance
-//! heuristic over all channels (Wilkie et al., "Hero Wavelength Spectral Sampling").
+//! Distances in homogeneous media are sampled for one channel, which is chosen by what the path carries of each, and
+//! weighted by the balance heuristic over all channels (Wilkie et al., "Hero Wavelength Spectral Sampling"). Those in
+//! volumes are the volumes' own.
 
 use super::World;
 use super::media::{MAX_SURFACES, MediaState};

@@ -1,7 +1,8 @@
 //! Participating media.
 
 use super::*;
-use crate::desc::{CoefficientDesc, PhaseDesc};
+use crate::assets::{VolumeData, vol_bytes};
+use crate::desc::{CoefficientDesc, PhaseDesc, VolumeDesc};
 
 const VOLPATH: &str = "<integrator type=\"volpath\"/>";
 
@@ -47,10 +48,63 @@ fn a_medium_outside_of_all_is_around_everything() {
 
 #[test]
 fn what_is_not_shown_is_said() {
-    let text = r#"<shape type="sphere"><medium type="heterogeneous" name="interior"/></shape>"#;
+    let text = r#"<shape type="sphere"><medium type="other" name="interior"/></shape>"#;
     let notes = notes(&format!("{VOLPATH}{text}"));
     assert!(notes.iter().any(|(outcome, _, note)| *outcome == Outcome::Ignored && note.contains("homogeneous")));
     let opaque = r#"<shape type="sphere"><bsdf type="diffuse"/><medium type="homogeneous" name="interior"/></shape>"#;
     let notes = super::notes(&format!("{VOLPATH}{opaque}"));
     assert!(notes.iter().any(|(_, name, note)| name == "interior" && note.contains("opaque")), "{notes:?}");
+}
+
+#[test]
+fn grids_and_mixed_phase_functions_are_read() {
+    let bytes =
+        |channels: u32| vol_bytes(&VolumeData::new([2, 1, 1], channels, vec![0.5; 2 * channels as usize]).unwrap());
+    let (density, albedo) = (bytes(1), bytes(3));
+    let grid = |name: &str, file: &str, more: &str| {
+        format!(
+            r#"<volume type="gridvolume" name="{name}"><string name="filename" value="{file}"/>
+            <transform name="to_world"><translate x="3"/></transform>{more}</volume>"#
+        )
+    };
+    let read = |medium: &str| {
+        let text = format!(
+            r#"<scene version="3.0.0"><sensor type="perspective"/>{VOLPATH}<shape type="sphere"><bsdf type="null"/>
+            <medium type="heterogeneous" name="interior" id="smoke">{medium}</medium></shape></scene>"#
+        );
+        let files = [("density.vol", &density[..]), ("albedo.vol", &albedo[..]), ("bad.vol", &b"VOX"[..])];
+        read_with(&text, &[], &files)
+    };
+    let phases = r#"<phase type="blendphase"><float name="weight" value="0.25"/><phase type="rayleigh"/>
+        <phase type="hg"><float name="g" value="0.5"/></phase></phase><float name="scale" value="4"/>"#;
+    let both = grid("sigma_t", "density.vol", "") + &grid("albedo", "albedo.vol", "") + phases;
+    let medium = &read(&both).unwrap().desc.media["smoke"];
+    assert_eq!(rgb(medium.scattering), [4.0; 3]);
+    assert_eq!(rgb(medium.absorption), [0.0; 3]);
+    let mix = vec![PhaseDesc::Rayleigh, PhaseDesc::HenyeyGreenstein { g: 0.5 }];
+    assert_eq!(medium.phase, PhaseDesc::Mix { phases: mix, weights: vec![0.75, 0.25] });
+    let volume = medium.volume.as_ref().unwrap();
+    let file = |volume: &Option<VolumeDesc>| match volume {
+        Some(VolumeDesc::Grid { file: Some(file), .. }) => file.clone(),
+        _ => panic!("{volume:?}"),
+    };
+    assert_eq!((file(&volume.density), file(&volume.albedo)), ("density.vol".into(), "albedo.vol".into()));
+    assert_eq!((volume.bounds, matrix(&volume.transform)[0][3]), ([[0.0; 3], [1.0; 3]], 3.0));
+    // A constant volume is no grid; a sigma_t of colours is a factor on both.
+    let constant = r#"<volume type="constvolume" name="albedo"><float name="value" value="0.5"/></volume>"#;
+    let medium = &read(&(grid("sigma_t", "albedo.vol", "") + constant)).unwrap().desc.media["smoke"];
+    let volume = medium.volume.as_ref().unwrap();
+    assert_eq!((rgb(medium.scattering), rgb(medium.absorption)), ([0.5; 3], [0.5; 3]));
+    assert_eq!((file(&volume.scattering), file(&volume.absorption)), ("albedo.vol".into(), "albedo.vol".into()));
+    assert!(volume.density.is_none() && volume.albedo.is_none());
+    assert!(read(constant).unwrap().desc.media["smoke"].volume.is_none());
+    // Faults have their place.
+    let missing = read(&grid("sigma_t", "gone.vol", "")).err().unwrap().to_string();
+    assert!(missing.contains("gone.vol") && missing.contains("s.xml"), "{missing}");
+    assert!(read(&grid("sigma_t", "bad.vol", "")).err().unwrap().to_string().contains("no .vol file"));
+    let one = r#"<phase type="blendphase"><float name="weight" value="0.25"/><phase type="rayleigh"/></phase>"#;
+    assert!(read(one).err().unwrap().to_string().contains("two phase functions"));
+    let loops =
+        r#"<phase type="blendphase" id="p"><float name="weight" value="0.5"/><ref id="p"/><ref id="p"/></phase>"#;
+    assert!(read(loops).err().unwrap().to_string().contains("refers to itself"));
 }

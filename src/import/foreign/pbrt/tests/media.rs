@@ -1,7 +1,7 @@
 //! Participating media.
 
 use super::*;
-use crate::desc::{MaterialDesc, PhaseDesc};
+use crate::desc::{BorderDesc, MaterialDesc, PhaseDesc, VolumeDesc};
 
 const SMOKE: &str = r#"MakeNamedMedium "smoke" "string type" "homogeneous" "rgb sigma_a" [1 2 3]
     "rgb sigma_s" [4 5 6] "float scale" 0.5 "float g" 0.25
@@ -29,10 +29,59 @@ fn the_medium_of_the_camera_is_around_everything() {
 }
 
 #[test]
-fn grids_and_unknown_media_are_left_out_and_said() {
-    let grid = "MakeNamedMedium \"cloud\" \"string type\" \"uniformgrid\"\n";
+fn vdb_files_and_unknown_media_are_left_out_and_said() {
+    let grid = "MakeNamedMedium \"cloud\" \"string type\" \"nanovdb\" \"string filename\" \"a.nvdb\"\n";
     let found = world(&format!("{grid}MediumInterface \"cloud\" \"fog\"\nMaterial \"dielectric\"\nShape \"sphere\""));
     assert_eq!(outcome(&found, "MakeNamedMedium", ""), Outcome::Ignored);
     assert_eq!(outcome(&found, "Shape", "MediumInterface"), Outcome::Ignored);
     assert!(found.desc.media.is_empty() && found.desc.medium.is_none());
+}
+
+fn file(volume: &Option<VolumeDesc>) -> &str {
+    match volume {
+        Some(VolumeDesc::Grid { file: Some(file), border: BorderDesc::Zero, .. }) => file,
+        _ => panic!("{volume:?}"),
+    }
+}
+
+#[test]
+fn grids_become_volumes() {
+    let grid = |more: &str| {
+        let text = format!(
+            "Translate 5 0 0\nMakeNamedMedium \"fire\" \"string type\" {more} \"integer nx\" 2 \"integer ny\" 1 \
+             \"integer nz\" 1 \"point3 p0\" [-1 -2 -3] \"point3 p1\" [1 2 3] \"float scale\" 2\n"
+        );
+        world(&format!("{text}MediumInterface \"fire\" \"\"\nMaterial \"interface\"\nShape \"sphere\""))
+    };
+    let found =
+        grid(r#""uniformgrid" "rgb sigma_a" [1 2 3] "float density" [0.5 7] "rgb Le" [1 1 2] "float Lescale" [3 4]"#);
+    let medium = &found.desc.media["fire"];
+    assert_eq!((medium.absorption.to_array(), medium.scattering.to_array()), ([2.0, 4.0, 6.0], [2.0; 3]));
+    assert_eq!(medium.emission.to_array(), [2.0, 4.0, 12.0]);
+    let volume = medium.volume.as_ref().unwrap();
+    assert_eq!(volume.bounds, [[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]]);
+    assert!(!volume.transform.is_empty());
+    assert_eq!(found.assets.volumes[file(&volume.density)].values, [0.5, 7.0]);
+    assert_eq!(found.assets.volumes[file(&volume.emission)].values, [3.0, 4.0]);
+    let found = grid(r#""rgbgrid" "rgb sigma_s" [1 2 3 4 5 6]"#);
+    let volume = found.desc.media["fire"].volume.as_ref().unwrap();
+    let scattering = &found.assets.volumes[file(&volume.scattering)];
+    assert_eq!((scattering.channels, &scattering.values[..]), (3, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0][..]));
+    assert!(volume.absorption.is_none() && volume.density.is_none());
+}
+
+#[test]
+fn malformed_grids_are_refused() {
+    for (grid, expected) in [
+        (r#""uniformgrid" "integer nx" 2 "float density" [1]"#, "2 values"),
+        (r#""uniformgrid" "integer nx" -2 "float density" [1]"#, "above 0"),
+        (r#""uniformgrid" "integer nx" 100000 "float density" [1]"#, "16384"),
+        (r#""uniformgrid" "integer nx" 1"#, "density"),
+        (r#""rgbgrid" "integer nx" 1"#, "sigma_a"),
+        (r#""rgbgrid" "rgb sigma_a" [1 2]"#, "left over"),
+    ] {
+        let text = format!("WorldBegin\nMakeNamedMedium \"m\" \"string type\" {grid}\n");
+        let error = read_with(&text, &[]).err().unwrap().to_string();
+        assert!(error.contains(expected), "{grid}: {error}");
+    }
 }
