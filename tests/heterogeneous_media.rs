@@ -174,7 +174,10 @@ fn a_constant_grid_is_a_homogeneous_medium() {
     scene["media"]["smoke"] = json!({ "scattering": [4, 3, 2], "absorption": [0.1, 0.5, 1], "emission": [0, 0, 0.2] });
     let homogeneous = runs(&scene);
     // Half the coefficients times 2; extinction divided by an albedo; factors on the albedo's parts.
-    let grid = |values: Value, channels: u32| json!({ "type": "grid", "resolution": [1, 1, 1], "channels": channels, "values": values });
+    let grid = |values: Value, channels: u32| {
+        let resolution = [1; 3];
+        json!({ "type": "grid", "resolution": resolution, "channels": channels, "values": values })
+    };
     for (medium, volume) in [
         (
             json!({ "scattering": [2, 1.5, 1], "absorption": [0.05, 0.25, 0.5], "emission": [0, 0, 0.1] }),

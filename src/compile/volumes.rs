@@ -7,7 +7,7 @@ use crate::color::Rgb;
 use crate::desc::{BorderDesc, MediumVolumeDesc, VolumeDesc};
 use crate::error::Result;
 use crate::math::{DAffine3, DMat3, DVec3};
-use crate::medium::{Border, Medium, Noise, Split, Volume, VolumeGrids, VoxelGrid};
+use crate::medium::{Border, ExtinctionSplit, Medium, Noise, Volume, VolumeGrids, VoxelGrid};
 use crate::memory::is_available;
 
 /// The most voxels of noise.
@@ -26,13 +26,13 @@ pub(super) fn volume(files: &CompileContext, path: &str, desc: &MediumVolumeDesc
     let brightest = |rgb: Rgb| if rgb.is_black() { f32::MAX } else { MAX_COEFFICIENT / rgb.max_channel() };
     let limit = brightest(medium.extinction()).min(brightest(medium.emission));
     let split = match (albedo, absorption, scattering) {
-        (None, None, None) => Split::Even,
-        (Some(_), None, None) => colors("albedo", albedo, 1.0)?.map_or(Split::Even, Split::Albedo),
+        (None, None, None) => ExtinctionSplit::Even,
+        (Some(_), None, None) => colors("albedo", albedo, 1.0)?.map_or(ExtinctionSplit::Even, ExtinctionSplit::Albedo),
         (Some(_), _, _) => {
             let message = "cannot be given together with `absorption` or `scattering`";
             return Err(files.error(&format!("{path}.albedo"), message));
         }
-        (None, _, _) => Split::Factors {
+        (None, _, _) => ExtinctionSplit::Factors {
             absorption: colors("absorption", absorption, limit)?,
             scattering: colors("scattering", scattering, limit)?,
         },

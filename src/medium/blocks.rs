@@ -158,7 +158,7 @@ mod tests {
             }
             assert!((ray.end - t).abs() < 1e-5 * ray.end + 1e-6, "{ray:?} {t}");
         }
-        assert!(found > 2_000);
+        assert!(found > 500, "{found}");
     }
 
     #[test]

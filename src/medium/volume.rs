@@ -30,14 +30,14 @@ pub struct VolumeGrids {
     /// Factor on absorption, scattering and emission.
     pub density: Option<VoxelGrid<f32>>,
     /// How extinction is divided into absorption and scattering.
-    pub split: Split,
+    pub split: ExtinctionSplit,
     /// Factor on emission.
     pub emission: Option<VoxelGrid<Rgb>>,
 }
 
 /// How extinction is divided into absorption and scattering.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub enum Split {
+pub enum ExtinctionSplit {
     /// Everywhere alike.
     #[default]
     Even,
@@ -257,9 +257,9 @@ impl VolumeGrids {
     /// The finest along each axis.
     fn resolution(&self) -> [usize; 3] {
         let colors = match &self.split {
-            Split::Even => [None, None],
-            Split::Albedo(albedo) => [Some(albedo), None],
-            Split::Factors { absorption, scattering } => [absorption.as_ref(), scattering.as_ref()],
+            ExtinctionSplit::Even => [None, None],
+            ExtinctionSplit::Albedo(albedo) => [Some(albedo), None],
+            ExtinctionSplit::Factors { absorption, scattering } => [absorption.as_ref(), scattering.as_ref()],
         };
         let colors = colors.into_iter().chain([self.emission.as_ref()]).flatten().map(VoxelGrid::resolution);
         let all = colors.chain(self.density.as_ref().map(VoxelGrid::resolution));
@@ -272,12 +272,12 @@ impl VolumeGrids {
         let density = self.density.as_ref().map_or(1.0, |grid| grid.at(p));
         let factor = |grid: &Option<VoxelGrid<Rgb>>| grid.as_ref().map_or(Rgb::WHITE, |grid| grid.at(p));
         let (absorption, scattering) = match &self.split {
-            Split::Even => (medium.absorption, medium.scattering),
-            Split::Albedo(albedo) => {
+            ExtinctionSplit::Even => (medium.absorption, medium.scattering),
+            ExtinctionSplit::Albedo(albedo) => {
                 let (extinction, albedo) = (medium.extinction(), albedo.at(p));
                 (extinction * (Rgb::WHITE - albedo), extinction * albedo)
             }
-            Split::Factors { absorption, scattering } => {
+            ExtinctionSplit::Factors { absorption, scattering } => {
                 (medium.absorption * factor(absorption), medium.scattering * factor(scattering))
             }
         };
@@ -294,8 +294,10 @@ impl VolumeGrids {
         let of = |grid: &Option<VoxelGrid<Rgb>>| grid.as_ref().map_or(one, |grid| grid.bounds(min, max));
         let density = self.density.as_ref().map_or(Interval { min: 1.0, max: 1.0 }, |density| density.bounds(min, max));
         let extinction = match &self.split {
-            Split::Even | Split::Albedo(_) => Interval { min: medium.extinction(), max: medium.extinction() },
-            Split::Factors { absorption, scattering } => {
+            ExtinctionSplit::Even | ExtinctionSplit::Albedo(_) => {
+                Interval { min: medium.extinction(), max: medium.extinction() }
+            }
+            ExtinctionSplit::Factors { absorption, scattering } => {
                 let (a, s) = (of(absorption), of(scattering));
                 let sum = |a: Rgb, s: Rgb| medium.absorption * a + medium.scattering * s;
                 Interval { min: sum(a.min, s.min), max: sum(a.max, s.max) }

@@ -3,6 +3,7 @@
 use std::ops::{Add, Mul};
 
 use crate::color::Rgb;
+use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{Vec3, vec3};
 
 /// What voxels hold.
@@ -113,8 +114,9 @@ impl<T: Voxel> VoxelGrid<T> {
         // A little wider, so that rounding leads out of no box.
         let range = |axis: usize| {
             let (scale, last) = (self.scale[axis], self.resolution[axis] - 1);
-            let low = (min[axis] * scale + self.offset - 1e-3).max(0.0) as usize;
-            let high = (max[axis] * scale + self.offset + 1e-3).max(0.0).ceil() as usize;
+            let rounding = 8.0 * UNIT_ROUNDOFF as f32 * (scale + 1.0);
+            let low = (min[axis] * scale + self.offset - rounding).max(0.0) as usize;
+            let high = (max[axis] * scale + self.offset + rounding).max(0.0).ceil() as usize;
             low.min(last)..=high.min(last)
         };
         let [nx, ny, _] = self.resolution;

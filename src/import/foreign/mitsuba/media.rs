@@ -10,8 +10,6 @@ use crate::error::Result;
 /// The largest mean cosine of a phase function.
 const MAX_G: f64 = 0.99;
 
-const UNSUPPORTED: &str = "only homogeneous and heterogeneous participating media are supported: left out";
-
 const UNSEEN: &str = "the integrator shows no participating media: left out";
 
 /// The media on both sides of a shape.
@@ -40,23 +38,14 @@ impl<'a> Reader<'a> {
             element.ignored(name, UNSEEN);
             return Ok(None);
         }
-        let medium = self.named_medium(id)?;
-        match &medium {
-            Some(_) => drop(element.take(name)),
-            None => element.ignored(name, UNSUPPORTED),
-        }
-        Ok(medium)
+        element.take(name);
+        self.named_medium(id).map(Some)
     }
 
     /// The name of what a medium becomes.
-    fn named_medium(&mut self, id: PluginId) -> Result<Option<String>> {
+    fn named_medium(&mut self, id: PluginId) -> Result<String> {
         if let Some(name) = self.media.get(&id) {
             return Ok(name.clone());
-        }
-        if !matches!(self.document.plugins[id.0].kind.as_str(), "homogeneous" | "heterogeneous") {
-            self.whole(id, UNSUPPORTED);
-            self.media.insert(id, None);
-            return Ok(None);
         }
         let mut element = Element::new(self.document, id);
         let scale = element.float("scale")?.unwrap_or(1.0) as f32;
@@ -89,8 +78,8 @@ impl<'a> Reader<'a> {
         let name = if element.plugin.id.is_empty() { "medium" } else { &element.plugin.id };
         let name = self.draft.add_medium(name, &element.place().to_string(), desc);
         element.finish(&mut self.draft);
-        self.media.insert(id, Some(name.clone()));
-        Ok(Some(name))
+        self.media.insert(id, name.clone());
+        Ok(name)
     }
 
     /// A number, colour, spectrum or constant volume.

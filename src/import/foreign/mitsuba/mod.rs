@@ -76,8 +76,8 @@ struct Reader<'a> {
     reliefs: BTreeSet<String>,
     /// The material that reflects nothing.
     black: Option<String>,
-    /// What media have become; none where they are unsupported.
-    media: BTreeMap<PluginId, Option<String>>,
+    /// The names of what media have become.
+    media: BTreeMap<PluginId, String>,
     /// Materials of surfaces of media, by those of the surface, the names of the media inside, and whether another is
     /// outside.
     containers: BTreeMap<(String, Option<String>, bool), String>,

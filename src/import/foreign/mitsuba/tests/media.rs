@@ -48,9 +48,10 @@ fn a_medium_outside_of_all_is_around_everything() {
 
 #[test]
 fn what_is_not_shown_is_said() {
-    let text = r#"<shape type="sphere"><medium type="other" name="interior"/></shape>"#;
+    let text = r#"<shape type="sphere"><medium type="homogeneous" name="interior"><phase type="tabphase"/></medium>
+        </shape>"#;
     let notes = notes(&format!("{VOLPATH}{text}"));
-    assert!(notes.iter().any(|(outcome, _, note)| *outcome == Outcome::Ignored && note.contains("homogeneous")));
+    assert!(notes.iter().any(|(outcome, _, note)| *outcome == Outcome::Ignored && note.contains("isotropic")));
     let opaque = r#"<shape type="sphere"><bsdf type="diffuse"/><medium type="homogeneous" name="interior"/></shape>"#;
     let notes = super::notes(&format!("{VOLPATH}{opaque}"));
     assert!(notes.iter().any(|(_, name, note)| name == "interior" && note.contains("opaque")), "{notes:?}");
