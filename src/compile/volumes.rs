@@ -146,7 +146,7 @@ fn read_file(
         return Ok(volume.clone());
     }
     let asset = files.source.asset(name);
-    let extension = asset.extension().map(|e| e.to_ascii_lowercase()).unwrap_or_default();
+    let extension = asset.extension().map(std::ffi::OsStr::to_ascii_lowercase).unwrap_or_default();
     let read = if extension == "vol" {
         read_vol(&asset)
     } else if extension == "vdb" || extension == "nvdb" {

@@ -140,7 +140,7 @@ impl Volume {
     /// Moves a volume of the world to a render space.
     pub fn place(&mut self, space: &RenderSpace) {
         let factor = (1.0 / space.scale()) as f32;
-        self.unit_from_render = self.unit_from_render * space.to_world();
+        self.unit_from_render *= space.to_world();
         self.majorants.iter_mut().for_each(|majorant| *majorant *= factor);
         for Interval { min, max } in &mut self.extinction {
             (*min, *max) = (*min * factor, *max * factor);
@@ -161,13 +161,10 @@ impl Volume {
             let majorant = self.majorants[segment.block];
             let [mut t, end] = segment.t;
             let depth_per_t = majorant * ray.length;
-            while depth_per_t > 0.0 {
-                let next = t + flight.depth / depth_per_t;
-                if next >= end {
-                    flight.depth = (flight.depth - (end - t) * depth_per_t).max(0.0);
-                    break;
-                }
-                t = next;
+            // Where the density is zero, at infinity.
+            let next = |t: f32, depth: f32| t + depth / depth_per_t;
+            while next(t, flight.depth) < end {
+                t = next(t, flight.depth);
                 flight.next();
                 let at = self.grids.at(medium, ray.at(t));
                 if self.grids.emission.is_some() || !medium.emission.is_black() {
@@ -184,6 +181,7 @@ impl Volume {
                     return tracked;
                 }
             }
+            flight.depth = (flight.depth - (end - t) * depth_per_t).max(0.0);
         }
         tracked
     }
@@ -201,18 +199,15 @@ impl Volume {
             left *= transmittance(min, (end - t) * ray.length);
             let residual = (max - min).max_channel();
             let depth_per_t = residual * ray.length;
-            while depth_per_t > 0.0 {
-                let next = t + depth / depth_per_t;
-                if next >= end {
-                    depth = (depth - (end - t) * depth_per_t).max(0.0);
-                    break;
-                }
-                t = next;
+            let next = |t: f32, depth: f32| t + depth / depth_per_t;
+            while next(t, depth) < end {
+                t = next(t, depth);
                 depth = exponential(random.unit_f32());
                 let at = self.grids.at(medium, ray.at(t));
                 let rest = (at.absorption + at.scattering - min) * residual.recip();
                 left *= rest.map(|rest| (1.0 - rest).clamp(0.0, 1.0));
             }
+            depth = (depth - (end - t) * depth_per_t).max(0.0);
             let most = left.max_channel();
             if most < LEAST_LEFT {
                 if random.unit_f32() * LEAST_LEFT >= most {

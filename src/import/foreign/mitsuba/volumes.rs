@@ -73,7 +73,7 @@ impl<'a> Reader<'a> {
         let mut map = volume.transform("to_world")?;
         if volume.boolean("use_grid_bbox", false)? {
             let [min, max] = bounds.map(|corner| DVec3::from(corner.map(f64::from)));
-            map = map * DAffine3 { matrix3: DMat3::from_diagonal(max - min), translation: min };
+            map *= DAffine3 { matrix3: DMat3::from_diagonal(max - min), translation: min };
         }
         // Numbers of voxels are linear.
         volume.boolean("raw", false)?;
