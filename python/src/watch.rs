@@ -17,6 +17,9 @@ use crate::scene::{PyScene, apply};
 /// How often signals are looked for and progress is reported.
 const INTERVAL: Duration = Duration::from_millis(50);
 
+/// As much as the main thread of a program has.
+const STACK: usize = 8 << 20;
+
 /// A renderer after its render.
 type Done = (Renderer, steradian::Result<Rendering>);
 
@@ -33,8 +36,8 @@ pub fn render(
     settings: Option<Bound<'_, PyDict>>,
 ) -> PyResult<PyImage> {
     let py = scene.py();
-    let merged = scene.borrow().merged(settings.as_ref())?;
-    let renderer = scene.borrow_mut().take()?;
+    let merged = scene.try_borrow()?.merged(settings.as_ref())?;
+    let renderer = scene.try_borrow_mut()?.take()?;
     let (renderer, applied) = apply(py, renderer, merged);
     if let Err(error) = applied {
         scene.borrow_mut().put(renderer);
@@ -44,7 +47,7 @@ pub fn render(
     let (seen, stop) = (Arc::clone(&share), StopHandle::default());
     let mut renderer = renderer.stop_with(&stop).on_progress(move |done| seen.store(done.to_bits(), Ordering::Relaxed));
     let (sender, receiver) = channel::<Done>();
-    let worker = std::thread::Builder::new().name("steradian".to_owned()).spawn(move || {
+    let worker = std::thread::Builder::new().name("steradian".to_owned()).stack_size(STACK).spawn(move || {
         let result = renderer.render();
         // The receiver waits for it.
         let _ = sender.send((renderer, result));

@@ -41,7 +41,8 @@ impl TrainedGuide {
     /// This guide, read from the checkpoint of this name.
     ///
     /// # Errors
-    /// As [`read`](Self::read); [`Error::Setting`] if no file is named; [`Error::Checkpoint`] if it holds another guide.
+    /// As [`read`](Self::read); [`Error::Setting`] if no file is named; [`Error::Checkpoint`] if it holds another
+    /// guide.
     pub fn reload(&self, checkpoint: Option<&Path>) -> Result<Self> {
         let checkpoint = checkpoint.ok_or_else(|| {
             refused("guide", ": the picture was rendered with a guide; give the checkpoint that holds it")

@@ -246,8 +246,7 @@ impl Renderer {
     /// Reads what the scene names and builds the accelerator, as far as that has not been done.
     ///
     /// # Errors
-    /// As [`CheckedScene::compile`](crate::compile::CheckedScene::compile); [`Error::Setting`](crate::Error::Setting) if
-    /// a setting is impossible.
+    /// As [`CheckedScene::compile`]; [`Error::Setting`] if a setting is impossible.
     pub fn load(&mut self) -> Result<&mut Self> {
         let settings = self.settings()?;
         self.update(&settings)?;
