@@ -97,10 +97,10 @@ class Parameters:
             yield from _paths(part, parts.get(part, {}))
 
     def __contains__(self, path: object) -> bool:
-        return path in list(self)
+        return any(path == known for known in self)
 
     def __len__(self) -> int:
-        return len(list(self))
+        return sum(1 for _ in self)
 
     def keys(self) -> list[str]:
         """All paths whose values are set."""

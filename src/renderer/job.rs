@@ -14,7 +14,7 @@ use crate::error::Result;
 use crate::film::LayerSet;
 use crate::import::SceneFingerprint;
 use crate::output::{RenderInfo, RenderStatistics};
-use crate::render::{Header, Progress, RenderProvenance, RenderSession, Replayed, Settings, Shard, render, replay};
+use crate::render::{Header, Progress, RenderProvenance, RenderSession, Replayed, Settings, render, replay};
 use crate::scene::Scene;
 
 /// Who observes a render and ends it.
@@ -159,10 +159,5 @@ impl PreparedRender {
     /// As [`denoise_image`].
     pub fn denoise(&self, rendering: &mut Rendering) -> Result<()> {
         self.job.denoise(rendering)
-    }
-
-    /// Which part of the samples is rendered.
-    pub fn shard(&self) -> Shard {
-        self.job.state.as_ref().map(StateFiles::shard).unwrap_or_default()
     }
 }

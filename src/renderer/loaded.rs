@@ -1,6 +1,7 @@
 //! A compiled scene together with the accelerator over its geometry.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use self_cell::self_cell;
 
@@ -42,17 +43,19 @@ impl LoadedScene {
                 && (Arc::ptr_eq(&before.scene.geometry, &scene.geometry)
                     || before.scene.geometry.is_same(&scene.geometry))
         });
-        let start = std::time::Instant::now();
-        let accel = match kept {
+        let start = Instant::now();
+        let (accel, build_seconds) = match kept {
             Some(before) => {
                 scene.geometry = Arc::clone(&before.scene.geometry);
-                before.accel
+                (before.accel, 0.0)
             }
-            None => OwnedAccel::try_new(Arc::clone(&scene.geometry), |geometry| {
-                accel::build(settings.accel, geometry, settings.threads)
-            })?,
+            None => {
+                let accel = OwnedAccel::try_new(Arc::clone(&scene.geometry), |geometry| {
+                    accel::build(settings.accel, geometry, settings.threads)
+                })?;
+                (accel, start.elapsed().as_secs_f64())
+            }
         };
-        let build_seconds = start.elapsed().as_secs_f64();
         let mut loaded = Self { scene, accel, kind: settings.accel, is_in_focus: false, load_seconds, build_seconds };
         loaded.adapt_lens(settings);
         Ok(loaded)
