@@ -183,7 +183,7 @@ impl Renderer {
 
     /// Who is informed of the progress.
     #[must_use]
-    pub fn progress(mut self, progress: impl Progress + Send + Sync + 'static) -> Self {
+    pub fn progress(mut self, progress: impl Progress + Send + 'static) -> Self {
         self.progress = Box::new(progress);
         self
     }
