@@ -204,7 +204,7 @@ impl Renderer {
     /// The settings of the scene with all changes.
     ///
     /// # Errors
-    /// [`Error::Setting`](crate::Error::Setting) if a setting is impossible.
+    /// [`Error::Setting`] if a setting is impossible.
     pub fn settings(&self) -> Result<Settings> {
         if let Some(settings) = &self.settings {
             return Ok(settings.clone());
@@ -216,7 +216,7 @@ impl Renderer {
     /// file or no file has the scene.
     ///
     /// # Errors
-    /// [`Error::Missing`](crate::Error::Missing) if a file of the scene cannot be read.
+    /// [`Error::Missing`] if a file of the scene cannot be read.
     pub fn recipe(&mut self, settings: &Settings) -> Result<Option<RenderProvenance>> {
         let is_exr = |file: &str| Format::from_path(Path::new(file)).is_ok_and(|format| format == Format::Exr);
         if self.recipe.is_some() {
@@ -280,7 +280,7 @@ impl Renderer {
     /// The values of one sample of one pixel, before the filter's weight: exactly those that the picture has.
     ///
     /// # Errors
-    /// As [`load`](Self::load); [`Error::Setting`](crate::Error::Setting) if the pixel lies outside the picture.
+    /// As [`load`](Self::load); [`Error::Setting`] if the pixel lies outside the picture.
     pub fn replay(&mut self, pixel: [u32; 2], sample: u32) -> Result<Replayed> {
         let mut settings = self.settings()?;
         if let Some(options) = &self.denoise {

@@ -90,8 +90,8 @@ impl RenderState {
     /// Continues from the state in a file.
     ///
     /// # Errors
-    /// [`Error::Missing`] if it cannot be read, [`Error::Checkpoint`] if it is damaged or
-    /// belongs to another picture than `header`.
+    /// [`Error::Missing`](crate::Error::Missing) if it cannot be read, [`Error::Checkpoint`](crate::Error::Checkpoint)
+    /// if it is damaged or belongs to another picture than `header`.
     pub fn read(path: &Path, header: &Header, scene: &Scene, settings: &Settings) -> Result<Self> {
         let mut reader = Reader::open(path)?;
         fits(&reader, header)?;
@@ -214,7 +214,7 @@ fn fits(reader: &Reader, requested: &Header) -> Result<()> {
 /// Whether the state of a render can be kept, and the render be split.
 ///
 /// # Errors
-/// [`Error::Setting`] if not.
+/// [`Error::Setting`](crate::Error::Setting) if not.
 pub fn check_resumable(settings: &Settings, shard: Shard) -> Result<()> {
     if shard != Shard::WHOLE && settings.is_guided() {
         return Err(refused(
