@@ -27,6 +27,14 @@ pub enum Error {
     /// The command line is impossible.
     #[error("{0}")]
     Usage(String),
+    /// A setting of a render is impossible, or unsupported beside another.
+    #[error("{message}")]
+    Setting {
+        /// The setting, such as `max_depth`: a field of [`Overrides`](crate::render::Overrides).
+        setting: &'static str,
+        /// What is wrong: `` `max_depth` 0: depth counts from 1 ``. Names of settings are in backquotes.
+        message: String,
+    },
     /// A fault in a scene's text: `scene.json:3:14: shapes[2].radius: ...`.
     #[error("{}:{line}:{column}: {message}", file.display())]
     Parse {
@@ -137,7 +145,7 @@ impl Error {
     /// The kind of fault.
     pub fn kind(&self) -> ErrorKind {
         match self {
-            Self::Usage(_) => ErrorKind::Usage,
+            Self::Usage(_) | Self::Setting { .. } => ErrorKind::Usage,
             Self::Parse { .. } | Self::Scene { .. } | Self::Asset { .. } | Self::Malformed { .. } => ErrorKind::Scene,
             Self::Missing { .. } => ErrorKind::AssetMissing,
             Self::Output { .. } => ErrorKind::Output,

@@ -21,7 +21,7 @@
 //! | 5 | `scene`, `denoise` |
 //! | 6 | `import`, `integrator`, `compile` |
 //! | 7 | `render`, `convert` |
-//! | 8 | `bench`, `farm`, `live` |
+//! | 8 | `bench`, `farm`, `live`, `renderer` |
 //! | 9 | `bin/steradian` |
 
 // Checks of numerical stability use parts that a render does not.
@@ -63,9 +63,14 @@ pub mod opacity;
 pub mod output;
 pub mod printable;
 pub mod render;
+mod renderer;
 pub mod sampling;
 pub mod scene;
 pub mod suggestion;
 pub mod texture;
 
 pub use error::{Error, ErrorKind, Result};
+pub use renderer::{
+    Assignment, LayerView, PreparedRender, Renderer, Rendering, StateOptions, StopHandle, Watch, changed_settings,
+    default_outputs, layers_of,
+};

@@ -2,6 +2,7 @@
 //! materials.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
@@ -82,8 +83,8 @@ pub struct SceneFeatures {
 /// A scene ready to render.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// All shapes.
-    pub geometry: Geometry,
+    /// All shapes; accelerators are over them.
+    pub geometry: Arc<Geometry>,
     /// How each shape looks, by [`ShapeId`].
     pub surfaces: Vec<Surface>,
     /// Materials, by [`MaterialId`].

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
+use super::file_cache::MeshKey;
 use super::normals::{self, Smoothing};
 use super::{CompileContext, attributes};
 use crate::assets::{self, AssetError, MeshData, ObjMaterial};
@@ -14,6 +15,7 @@ use crate::geometry::{Mesh, MeshError, MeshStep};
 use crate::math::{DVec3, Transform, Vec3};
 
 /// A mesh as given, with the material that its file names.
+#[derive(Clone)]
 pub struct LoadedMesh {
     pub data: MeshData,
     /// Its vertices at later times.
@@ -137,6 +139,10 @@ fn load_file(
         return Ok(vec![plain(data.clone(), None)]);
     }
     let asset = files.source.asset(file);
+    let key = MeshKey { asset: asset.clone(), with_materials, attributes: attributes.clone() };
+    if let Some(kept) = files.cache.as_ref().and_then(|cache| cache.mesh(&key)) {
+        return Ok(kept);
+    }
     let extension = asset.extension().map(|e| e.to_string_lossy().to_lowercase());
     let loaded = match extension.as_deref() {
         Some("ply") => assets::read_ply_attributes(&asset, Some(attributes)).map(|data| vec![plain(data, None)]),
@@ -144,7 +150,11 @@ fn load_file(
             .map(|meshes| meshes.into_iter().map(|mesh| plain(mesh.mesh, mesh.material)).collect()),
         _ => Err(AssetError::Malformed("meshes are .obj or .ply files".into())),
     };
-    loaded.map_err(|e| files.asset_error(place, &asset, e))
+    let loaded = loaded.map_err(|e| files.asset_error(place, &asset, e))?;
+    if let Some(cache) = &files.cache {
+        cache.keep_mesh(key, &loaded);
+    }
+    Ok(loaded)
 }
 
 /// How a mesh is placed.

@@ -3,10 +3,12 @@
 
 mod attributes;
 mod camera;
+mod changes;
 mod check;
 mod coincident;
 mod composites;
 mod faults;
+mod file_cache;
 mod identities;
 mod keyframes;
 mod lights;
@@ -29,12 +31,15 @@ mod textures;
 mod transforms;
 mod volumes;
 
+pub use changes::change_camera;
+pub use file_cache::FileCache;
 pub use settings::{CheckedScene, check_film_and_integrator};
 pub use summary::Summary;
 
 use std::collections::BTreeSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use crate::assets::{AssetError, SceneSource};
 use crate::desc::{CausticsDesc, IntegratorDesc, SceneDesc};
@@ -132,18 +137,20 @@ const MAX_LISTED: usize = 12;
 #[derive(Clone, Debug)]
 struct CompileContext {
     source: SceneSource,
+    /// Files that were read before, if they are kept.
+    cache: Option<Arc<FileCache>>,
 }
 
 impl From<SceneSource> for CompileContext {
     fn from(source: SceneSource) -> Self {
-        Self { source }
+        Self { source, cache: None }
     }
 }
 
 impl CompileContext {
     /// A scene whose assets are all files.
     fn new(scene: impl Into<PathBuf>) -> Self {
-        Self { source: SceneSource::new(scene) }
+        SceneSource::new(scene).into()
     }
 
     /// An error at a place of the scene.
@@ -272,7 +279,7 @@ impl Builder {
             motion: self.geometry.is_moving() || camera.is_moving(),
         };
         Ok(Scene {
-            geometry: self.geometry,
+            geometry: Arc::new(self.geometry),
             surfaces: self.surfaces,
             materials,
             normal_perturbations: self.materials.normal_perturbations,

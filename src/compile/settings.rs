@@ -2,9 +2,10 @@
 
 use std::collections::HashMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use super::faults::Faults;
-use super::{CompileContext, camera};
+use super::{CompileContext, FileCache, camera};
 use crate::assets::SceneSource;
 use crate::camera::Camera;
 use crate::desc::{FilmDesc, FilterDesc, IntegratorDesc, MAX_FILTER_RADIUS, MAX_SIDE, OutputDesc, SceneDesc};
@@ -28,7 +29,18 @@ impl<'a> CheckedScene<'a> {
     /// [`Error::Scene`](crate::Error::Scene) with the key of a number that makes no sense,
     /// or [`Error::Several`](crate::Error::Several).
     pub fn new(desc: &'a SceneDesc, source: SceneSource) -> Result<Self> {
-        let files = CompileContext::from(source);
+        Self::check(desc, source.into())
+    }
+
+    /// As [`new`](Self::new), for a scene that is compiled again and again: files are read once.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn with_cache(desc: &'a SceneDesc, source: SceneSource, cache: Arc<FileCache>) -> Result<Self> {
+        Self::check(desc, CompileContext { source, cache: Some(cache) })
+    }
+
+    fn check(desc: &'a SceneDesc, files: CompileContext) -> Result<Self> {
         let mut faults = Faults::default();
         faults.keep(check_film(&files, &desc.film));
         if desc.sampler.spp == 0 {

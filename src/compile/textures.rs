@@ -394,8 +394,15 @@ fn read_all(files: &CompileContext, desc: &SceneDesc, used: &UsedNames) -> HashM
         .filter_map(|(_, texture)| file(texture))
         .collect();
     let read = |asset: PathBuf| {
+        if let Some(kept) = files.cache.as_ref().and_then(|cache| cache.image(&asset)) {
+            return Some((asset, kept));
+        }
         let image = TextureImage::new(read_image(&asset).ok()?).ok()?;
-        Some((asset, Arc::new(image)))
+        let image = Arc::new(image);
+        if let Some(cache) = &files.cache {
+            cache.keep_image(&asset, &image);
+        }
+        Some((asset, image))
     };
     names.into_par_iter().filter_map(read).collect()
 }

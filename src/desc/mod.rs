@@ -5,6 +5,7 @@
 //! their names end. Colours are linear Rec.709. Unknown keys are errors. Comments (`//` and `/* */`) and
 //! commas behind the last entry are allowed; a list of one entry may be the entry alone, a grey one number.
 
+mod build;
 mod camera;
 mod files;
 mod light;

@@ -8,7 +8,7 @@ use crate::math::float::{EMBREE_LARGE, UNIT_ROUNDOFF};
 use crate::math::{Aabb, Bounds, DMat3, Motion, Ray, Transform, Vec3};
 
 /// A group of shapes in a space of its own.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Object {
     /// The shapes of the group.
     pub shapes: Vec<ShapeId>,
@@ -24,7 +24,7 @@ pub struct InverseReach {
 }
 
 /// One placement of an object in the world.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Instance {
     /// What is placed.
     pub object: ObjectId,

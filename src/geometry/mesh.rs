@@ -32,8 +32,23 @@ pub struct Mesh {
     bounds: OnceLock<Aabb>,
 }
 
+/// Whether the buffers are the same; bounds follow from them.
+impl PartialEq for Mesh {
+    fn eq(&self, other: &Self) -> bool {
+        let Self { positions, triangles, normals, uvs, attributes, later, tangents, has_slivers, bounds: _ } = self;
+        *positions == other.positions
+            && *triangles == other.triangles
+            && *normals == other.normals
+            && *uvs == other.uvs
+            && *attributes == other.attributes
+            && *later == other.later
+            && *tangents == other.tangents
+            && *has_slivers == other.has_slivers
+    }
+}
+
 /// The vertices of a deforming mesh at one time.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshStep {
     /// As many positions as the mesh has.
     pub positions: Vec<[f32; 3]>,

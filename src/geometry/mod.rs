@@ -55,7 +55,7 @@ use crate::math::{Aabb, DVec3, Ray, Vec3};
 ///
 /// Analytic surfaces are stored in place: a box would cost a cache miss at every hit, and there are few shapes.
 #[allow(clippy::large_enum_variant)]
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// Triangles, with positions in the space the shape is placed in.
     Mesh(Mesh),
@@ -132,6 +132,18 @@ pub struct Geometry {
 }
 
 impl Geometry {
+    /// Whether an accelerator over this geometry serves the other one: all shapes and placements are the same, and
+    /// neither has holes, which are textures.
+    pub fn is_same(&self, other: &Self) -> bool {
+        let Self { shapes, world, objects, instances, cutouts } = self;
+        cutouts.is_empty()
+            && other.cutouts.is_empty()
+            && *world == other.world
+            && *objects == other.objects
+            && *instances == other.instances
+            && *shapes == other.shapes
+    }
+
     /// The shape with this id.
     #[inline]
     pub fn shape(&self, id: ShapeId) -> &Shape {

@@ -19,7 +19,7 @@ use crate::math::vectorize::vectorize;
 use crate::math::{Bounds, DAffine3, DVec3, Ray, RayF64, RayRows, Transform, Vec2, Vec3};
 
 /// A surface given by a formula.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Analytic {
     /// Sphere, or the part of it within z and phi limits.
     Sphere(Sphere),
@@ -147,7 +147,7 @@ impl Analytic {
 }
 
 /// An analytic surface with its transform.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TransformedShape {
     /// The surface in its own space.
     pub shape: Analytic,

@@ -36,6 +36,10 @@ impl Progress for Fan<'_> {
         self.listeners.iter().for_each(|listener| listener.finish());
     }
 
+    fn note(&self, message: &str) {
+        self.listeners.iter().for_each(|listener| listener.note(message));
+    }
+
     fn warn(&self, message: &str) {
         self.listeners.iter().for_each(|listener| listener.warn(message));
     }

@@ -9,12 +9,12 @@ const INTERVALS: u32 = 64;
 
 /// A transform over the shutter interval, whose time runs from 0 to 1: a product of constant maps and keyframed ones,
 /// the outermost first.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
     parts: Vec<Part>,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 enum Part {
     Constant(DAffine3),
     Keyframed(Vec<Keyframe>),
@@ -23,7 +23,7 @@ enum Part {
 }
 
 /// An angle in radians at one time.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Angle {
     time: f64,
     angle: f64,
@@ -31,7 +31,7 @@ struct Angle {
 
 /// A transform at one time: first `stretch`, then `rotation`, then `translation` (Shoemake and Duff, "Matrix Animation
 /// and Polar Decomposition"). Each is interpolated by itself, so that what turns keeps its shape.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Keyframe {
     time: f64,
     translation: DVec3,

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 use super::planner::{Pass, PassSize};
+use super::settings::refused;
 use super::tile_renderer::{TileRenderer, TileWorkspace};
 use super::{Checkpoints, Progress, RenderState, Settings, Stats, check_resumable};
 use crate::accel::Accelerator;
@@ -46,7 +47,7 @@ impl RenderSession<'_> {
     /// has the same bits however often that happens.
     ///
     /// # Errors
-    /// As [`render`](super::render()); [`Error::Usage`] as [`check_resumable`] has it.
+    /// As [`render`](super::render()); [`Error::Setting`] as [`check_resumable`] has it.
     pub fn render(
         &self,
         mut state: RenderState,
@@ -73,7 +74,7 @@ impl RenderSession<'_> {
         match self.settings.time_limit.filter(|_| stats.time_limited && done == 0) {
             Some(limit) => {
                 let message = "twice that time was not enough for a sample of every pixel: no picture";
-                Err(Error::Usage(format!("--time-limit {}: {message}", limit.as_secs_f64())))
+                Err(refused("time_limit", format!(" {}: {message}", limit.as_secs_f64())))
             }
             None => Ok(()),
         }

@@ -1,42 +1,45 @@
-//! What the command line changes of EXR outputs.
+//! What the caller changes of EXR outputs.
+
+use serde::Deserialize;
 
 use crate::desc::{CompressionDesc, CryptoManifestDesc, ExrProfileDesc, OutputDesc};
 
 /// Changes of every EXR output; `None` keeps the value of the scene.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct ExrOverrides {
-    /// `--exr-profile`.
+    /// For which program the file is written.
     pub profile: Option<ExrProfileDesc>,
-    /// `--compression`.
+    /// The compression.
     pub compression: Option<CompressionDesc>,
-    /// `--dwa-level`.
+    /// The loss of DWA compression.
     pub dwa_level: Option<f32>,
-    /// `--uncropped`.
+    /// Whether a crop is written as the whole picture.
     pub uncropped: bool,
-    /// `--crypto-depth`.
+    /// Shapes of a pixel in Cryptomatte layers.
     pub crypto_depth: Option<u32>,
-    /// `--crypto-manifest`.
+    /// Where the names of Cryptomatte are.
     pub crypto_manifest: Option<CryptoManifestDesc>,
-    /// `--owner`.
+    /// The owner of the picture.
     pub owner: Option<String>,
-    /// `--comments`.
+    /// Free text.
     pub comments: Option<String>,
     /// Of a sequence of frames.
     pub frames_per_second: Option<f64>,
 }
 
 impl ExrOverrides {
-    /// An option that was given, if any was.
+    /// The name of a setting that was given, if any was.
     pub fn given(&self) -> Option<&'static str> {
         let given = [
-            ("--exr-profile", self.profile.is_some()),
-            ("--compression", self.compression.is_some()),
-            ("--dwa-level", self.dwa_level.is_some()),
-            ("--uncropped", self.uncropped),
-            ("--crypto-depth", self.crypto_depth.is_some()),
-            ("--crypto-manifest", self.crypto_manifest.is_some()),
-            ("--owner", self.owner.is_some()),
-            ("--comments", self.comments.is_some()),
+            ("exr_profile", self.profile.is_some()),
+            ("compression", self.compression.is_some()),
+            ("dwa_level", self.dwa_level.is_some()),
+            ("uncropped", self.uncropped),
+            ("crypto_depth", self.crypto_depth.is_some()),
+            ("crypto_manifest", self.crypto_manifest.is_some()),
+            ("owner", self.owner.is_some()),
+            ("comments", self.comments.is_some()),
         ];
         given.into_iter().find(|(_, given)| *given).map(|(name, _)| name)
     }

@@ -1,11 +1,11 @@
-//! Options of the command line that change the integrator.
+//! Settings that change the integrator.
 
 use super::Overrides;
-use super::settings::usage;
+use super::settings::refused;
 use crate::desc::{CausticsDesc, DEFAULT_RR_DEPTH, IntegratorDesc, RouletteDesc, SceneDesc, StrategyDesc};
 use crate::error::Result;
 
-/// The integrator of a scene, with the parameters that options set.
+/// The integrator of a scene, with the parameters that settings change.
 pub(super) fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc> {
     let mut integrator = match overrides.integrator {
         Some(chosen) if std::mem::discriminant(&chosen) != std::mem::discriminant(&desc.integrator) => chosen,
@@ -17,37 +17,38 @@ pub(super) fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<Inte
                 *max_depth = depth;
             }
             IntegratorDesc::Path { .. } | IntegratorDesc::Whitted { .. } => {
-                return Err(usage("--max-depth 0: depth counts from 1, directly visible light"));
+                return Err(refused("max_depth", " 0: depth counts from 1, directly visible light"));
             }
             _ => {
-                return Err(usage(
-                    "--max-depth: only the integrators path and whitted follow light over several segments",
+                return Err(refused(
+                    "max_depth",
+                    ": only the integrators path and whitted follow light over several segments",
                 ));
             }
         }
     }
     if let Some(chosen) = overrides.strategy {
         let IntegratorDesc::Path { strategy, .. } = &mut integrator else {
-            return Err(usage("--strategy: only the integrator path has strategies"));
+            return Err(refused("strategy", ": only the integrator path has strategies"));
         };
         *strategy = chosen;
     }
     set_roulette(&mut integrator, overrides)?;
     if let Some(limit) = overrides.clamp {
         let IntegratorDesc::Path { clamp, .. } = &mut integrator else {
-            return Err(usage("--clamp: only the integrator path can be clamped"));
+            return Err(refused("clamp", ": only the integrator path can be clamped"));
         };
         if !(limit > 0.0) {
-            return Err(usage(format!("--clamp {limit}: a number above 0, or inf for no limit")));
+            return Err(refused("clamp", format!(" {limit}: a number above 0, or inf for no limit")));
         }
         *clamp = Some(limit).filter(|limit| limit.is_finite());
     }
     if let Some(alpha) = overrides.regularize {
         let IntegratorDesc::Path { regularize, .. } = &mut integrator else {
-            return Err(usage("--regularize: only the integrator path makes surfaces rougher"));
+            return Err(refused("regularize", ": only the integrator path makes surfaces rougher"));
         };
         if !(0.0..=1.0).contains(&alpha) {
-            return Err(usage(format!("--regularize {alpha}: an alpha within 0 and 1, 0 for none")));
+            return Err(refused("regularize", format!(" {alpha}: an alpha within 0 and 1, 0 for none")));
         }
         *regularize = Some(alpha).filter(|&alpha| alpha > 0.0);
     }
@@ -59,7 +60,7 @@ pub(super) fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<Inte
 fn set_roulette(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Result<()> {
     if let Some(chosen) = overrides.roulette {
         let IntegratorDesc::Path { roulette, rr_depth, .. } = integrator else {
-            return Err(usage("--roulette: only the integrator path plays Russian roulette"));
+            return Err(refused("roulette", ": only the integrator path plays Russian roulette"));
         };
         *roulette = chosen;
         // Scenes of other renderers disable roulette by a depth that no path reaches.
@@ -73,20 +74,21 @@ fn set_roulette(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Resul
 fn set_guiding(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Result<()> {
     if let Some(enabled) = overrides.guiding {
         let IntegratorDesc::Path { guiding, .. } = integrator else {
-            return Err(usage("--guiding: only the integrator path can be guided"));
+            return Err(refused("guiding", ": only the integrator path can be guided"));
         };
         *guiding = enabled;
     }
     if overrides.guide.is_some() {
         let IntegratorDesc::Path { guiding, .. } = integrator else {
-            return Err(usage("--guide: only the integrator path can be guided"));
+            return Err(refused("guide", ": only the integrator path can be guided"));
         };
         // The guide is not trained further, whatever the scene says.
         *guiding = false;
     }
     if matches!(integrator, IntegratorDesc::Path { guiding: true, .. }) && overrides.target_error.is_some() {
-        return Err(usage(
-            "--target-error: not with guiding; give --guide, --guiding off, or --spp or --time-limit in its place",
+        return Err(refused(
+            "target_error",
+            ": not with guiding; give `guide`, `guiding` off, or `spp` or `time_limit` in its place",
         ));
     }
     Ok(())
@@ -95,7 +97,7 @@ fn set_guiding(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Result
 fn set_caustics(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Result<()> {
     if let Some(chosen) = overrides.caustics {
         let IntegratorDesc::Path { caustics, .. } = integrator else {
-            return Err(usage("--caustics: only the integrator path traces photons"));
+            return Err(refused("caustics", ": only the integrator path traces photons"));
         };
         *caustics = chosen;
     }
@@ -103,15 +105,15 @@ fn set_caustics(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Resul
         return Ok(());
     };
     let other = [
-        (*strategy != StrategyDesc::Mis, "--strategy other than mis"),
-        (regularize.is_some(), "--regularize"),
-        (*guiding, "--guiding on"),
-        (overrides.guide.is_some(), "--guide"),
-        (overrides.target_error.is_some(), "--target-error"),
+        (*strategy != StrategyDesc::Mis, "`strategy` other than mis"),
+        (regularize.is_some(), "`regularize`"),
+        (*guiding, "`guiding` on"),
+        (overrides.guide.is_some(), "`guide`"),
+        (overrides.target_error.is_some(), "`target_error`"),
     ];
     match other.into_iter().find(|(is_given, _)| *is_given) {
         Some((_, option)) => {
-            Err(usage(format!("--caustics photons: unsupported with {option}; give --caustics paths")))
+            Err(refused("caustics", format!(" photons: unsupported with {option}; give `caustics` paths")))
         }
         None => Ok(()),
     }

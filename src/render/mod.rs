@@ -23,6 +23,7 @@ pub use exr_overrides::ExrOverrides;
 pub use overrides::Overrides;
 pub use progress::{Progress, Silent};
 pub use provenance::{RenderProvenance, SequenceFrame};
+pub(crate) use settings::refused;
 pub use settings::{DEFAULT_EXTENSIONS, Settings, threads};
 pub use state::{Checkpoints, Header, Merged, RenderState, Shard, StateFile, check_resumable, merge};
 pub use trained_guide::TrainedGuide;
@@ -121,7 +122,7 @@ fn light_groups(scene: &Scene) -> Vec<String> {
 /// of a first pass there is no picture ([`Stats::spp_done`] is 0).
 ///
 /// # Errors
-/// If the threads cannot be started or the film does not fit in memory; [`Error::Usage`] if there is no picture in
+/// If the threads cannot be started or the film does not fit in memory; [`Error::Setting`] if there is no picture in
 /// twice the time limit.
 pub fn render(
     scene: &Scene,
@@ -157,12 +158,12 @@ pub fn replay(
 ) -> Result<Replayed> {
     let [width, height] = settings.film_size();
     if pixel[0] >= width || pixel[1] >= height {
-        return Err(Error::Usage(format!("--pixel {},{}: the film has {width}x{height} pixels", pixel[0], pixel[1])));
+        return Err(refused("pixel", format!(" {},{}: the film has {width}x{height} pixels", pixel[0], pixel[1])));
     }
     if settings.is_guided() {
-        return Err(Error::Usage(
-            "--pixel: with guiding, a sample depends on all that were before; replay it with --guiding off or --guide"
-                .into(),
+        return Err(refused(
+            "pixel",
+            ": with guiding, a sample depends on all that were before; replay it with `guiding` off or `guide`",
         ));
     }
     let mut renderer = TileRenderer::new(scene, accel, settings);

@@ -1,66 +1,73 @@
-//! What the command line changes about a render.
+//! What the caller changes about a render.
+
+use serde::Deserialize;
 
 use super::{ExrOverrides, TrainedGuide};
 use crate::accel::AccelKind;
 use crate::desc::{CausticsDesc, IntegratorDesc, LayerKind, RouletteDesc, SamplerKindDesc, StrategyDesc, ViewDesc};
 
-/// Overrides of the command line; `None` keeps the value of the scene.
-#[derive(Clone, Debug, Default)]
+/// Settings of a render that replace the scene's; `None` keeps the value of the scene.
+///
+/// The options of the command line have the same names, with hyphens in place of underscores.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Overrides {
-    /// `--spp`.
+    /// Samples per pixel; with a target error the most that a pixel gets.
     pub spp: Option<u32>,
-    /// `--target-error`.
+    /// Render until the picture's relative squared error is below this.
     pub target_error: Option<f64>,
-    /// `--size`: width and height.
+    /// Width and height in pixels.
     pub size: Option<[u32; 2]>,
-    /// `--crop`: x, y, width, height.
+    /// The part to render: x, y, width, height in pixels from the upper left corner.
     pub crop: Option<[u32; 4]>,
-    /// `--overscan`, in pixels.
+    /// Pixels that are rendered on each side beyond the picture.
     pub overscan: Option<u32>,
-    /// `--threads`; 0 means all.
+    /// Threads; 0 means all.
     pub threads: Option<usize>,
-    /// `--seed`.
+    /// Seed of the noise.
     pub seed: Option<u64>,
-    /// `--integrator`, with default parameters; those of the scene are kept if it has the same one.
+    /// The algorithm, with default parameters; those of the scene are kept if it has the same one.
     pub integrator: Option<IntegratorDesc>,
-    /// `--accel`.
+    /// The accelerator.
     pub accel: Option<AccelKind>,
-    /// `--no-depth-of-field`.
+    /// Render everything in focus, as if the camera had no lens.
     pub no_depth_of_field: bool,
-    /// `--transparent`.
+    /// The camera does not see light from infinity; alpha is 0 there.
     pub transparent: bool,
-    /// `--sampler`.
+    /// How samples are chosen.
     pub sampler: Option<SamplerKindDesc>,
-    /// `--max-depth`.
+    /// Most segments of a path, from 1: directly visible light.
     pub max_depth: Option<u32>,
-    /// `--strategy`.
+    /// How direct light is sampled.
     pub strategy: Option<StrategyDesc>,
-    /// `--clamp`; infinity means no limit.
+    /// Limit of the contribution of a single path; infinity means no limit.
     pub clamp: Option<f32>,
-    /// `--regularize`; 0 means none.
+    /// Least roughness behind rough surfaces, as alpha from 0 to 1; 0 means none.
     pub regularize: Option<f32>,
-    /// `--roulette`.
+    /// Russian roulette.
     pub roulette: Option<RouletteDesc>,
-    /// `--caustics`.
+    /// How caustics are found.
     pub caustics: Option<CausticsDesc>,
-    /// `--guiding`.
+    /// Whether paths train a guide.
     pub guiding: Option<bool>,
-    /// `--guide`: paths are guided by it, and do not train it.
+    /// Paths are guided by it, and do not train it.
+    #[serde(skip)]
     pub guide: Option<TrainedGuide>,
-    /// `--time-limit`, in seconds.
+    /// The render ends after this many seconds.
     pub time_limit: Option<f64>,
-    /// `--output`: these files in place of the scene's.
+    /// These files in place of the scene's.
     pub outputs: Vec<String>,
-    /// The files if neither the scene nor the command line names one.
+    /// The files if neither the scene nor `outputs` names one.
+    #[serde(skip)]
     pub default_outputs: Vec<String>,
-    /// `--layers`: for every EXR output.
+    /// The layers of every EXR output, beside the picture.
     pub layers: Vec<LayerKind>,
-    /// `--float`: for every EXR output.
+    /// 32-bit floats in every EXR output.
     pub float: bool,
     /// Of every EXR output.
     pub exr: ExrOverrides,
-    /// `--exposure`: for every PNG output.
+    /// Exposure of every PNG output, in stops.
     pub exposure: Option<f32>,
-    /// `--view`: for every PNG output.
+    /// The tone curve of every PNG output.
     pub view: Option<ViewDesc>,
 }

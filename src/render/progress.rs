@@ -37,6 +37,11 @@ pub trait Progress: Sync {
     /// No more samples will come. The picture is not written yet.
     fn finish(&self) {}
 
+    /// A message that is no warning.
+    fn note(&self, message: &str) {
+        let _ = message;
+    }
+
     /// A warning.
     fn warn(&self, message: &str) {
         let _ = message;

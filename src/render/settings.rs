@@ -1,5 +1,6 @@
-//! Everything a render needs beside the scene: the values of the scene file, overridden by the command line.
+//! Everything a render needs beside the scene: the values of the scene file, and the overrides of the caller.
 
+use std::fmt::Display;
 use std::num::NonZero;
 use std::time::Duration;
 
@@ -8,7 +9,9 @@ use serde::{Deserialize, Serialize};
 use super::integrator_overrides::integrator;
 use super::{Overrides, TrainedGuide};
 use crate::accel::AccelKind;
-use crate::desc::{CausticsDesc, FilterDesc, IntegratorDesc, MAX_SIDE, OutputDesc, PixelTypeDesc, SceneDesc, ViewDesc};
+use crate::desc::{
+    CausticsDesc, FilterDesc, IntegratorDesc, LayerKind, MAX_SIDE, OutputDesc, PixelTypeDesc, SceneDesc, ViewDesc,
+};
 use crate::error::{Error, Result};
 use crate::film::{Crop, LayerSet};
 use crate::output::check_output;
@@ -73,10 +76,10 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// The settings of a scene with the command line's changes.
+    /// The settings of a scene with the changes of the caller.
     ///
     /// # Errors
-    /// [`Error::Usage`] naming the option if a change is impossible.
+    /// [`Error::Setting`] if a change is impossible.
     pub fn new(desc: &SceneDesc, overrides: &Overrides) -> Result<Self> {
         let size = size(desc, overrides)?;
         let overscan = overscan(desc, overrides, size)?;
@@ -84,7 +87,7 @@ impl Settings {
         let outputs = outputs(desc, overrides, &integrator)?;
         let layers = outputs.iter().flat_map(|output| &output.layers).collect();
         if overrides.spp == Some(0) {
-            return Err(usage("--spp 0: a picture needs at least one sample per pixel"));
+            return Err(refused("spp", " 0: a picture needs at least one sample per pixel"));
         }
         Ok(Self {
             size,
@@ -126,6 +129,11 @@ impl Settings {
         self.outputs.iter().find_map(|output| output.view).unwrap_or_else(|| self.integrator.view())
     }
 
+    /// The layers beside the picture, as files are to store them.
+    pub fn stored_layers(&self) -> Vec<LayerKind> {
+        self.layers.iter().map(|info| info.kind).filter(|kind| *kind != LayerKind::Color).collect()
+    }
+
     /// Width and height of what is rendered: the picture with its overscan.
     pub fn film_size(&self) -> [u32; 2] {
         grown(self.size, self.overscan)
@@ -140,23 +148,23 @@ fn grown(size: [u32; 2], overscan: u32) -> [u32; 2] {
 fn overscan(desc: &SceneDesc, overrides: &Overrides, size: [u32; 2]) -> Result<u32> {
     let overscan = overrides.overscan.unwrap_or(desc.film.overscan);
     if overscan > size[0].min(size[1]) {
-        return Err(usage(format!(
-            "--overscan {overscan}: at most the picture's shorter side, {}",
-            size[0].min(size[1])
-        )));
+        return Err(refused(
+            "overscan",
+            format!(" {overscan}: at most the picture's shorter side, {}", size[0].min(size[1])),
+        ));
     }
     Ok(overscan)
 }
 
-/// An error of how options are used.
-pub(super) fn usage(message: impl Into<String>) -> Error {
-    Error::Usage(message.into())
+/// The error of a setting that is impossible; `rest` follows its name.
+pub(crate) fn refused(setting: &'static str, rest: impl Display) -> Error {
+    Error::Setting { setting, message: format!("`{setting}`{rest}") }
 }
 
 fn size(desc: &SceneDesc, overrides: &Overrides) -> Result<[u32; 2]> {
     let Some([width, height]) = overrides.size else { return Ok([desc.film.width, desc.film.height]) };
     if [width, height].iter().any(|side| *side == 0 || *side > MAX_SIDE) {
-        return Err(usage(format!("--size {width}x{height}: width and height range from 1 to {MAX_SIDE}")));
+        return Err(refused("size", format!(" {width}x{height}: width and height range from 1 to {MAX_SIDE}")));
     }
     Ok([width, height])
 }
@@ -167,30 +175,36 @@ fn crop(desc: &SceneDesc, overrides: &Overrides, size: [u32; 2], overscan: u32) 
         return Ok(Crop::full(grown(size, overscan)));
     };
     if overscan > 0 {
-        return Err(usage("--overscan: a crop leaves nothing around the picture; give one of them, or --overscan 0"));
+        return Err(refused(
+            "overscan",
+            ": a crop leaves nothing around the picture; give one of them, or `overscan` 0",
+        ));
     }
     let crop = Crop { x, y, width, height };
     if !crop.fits(size) {
         let numbers = format!("{x},{y},{width},{height}");
         let picture = format!("a picture of {}x{} pixels", size[0], size[1]);
         if overrides.crop.is_some() {
-            return Err(usage(format!("--crop {numbers} is empty or reaches beyond {picture}")));
+            return Err(refused("crop", format!(" {numbers} is empty or reaches beyond {picture}")));
         }
         if overrides.size.is_some() {
-            return Err(usage(format!("--size: the scene's crop {numbers} reaches beyond {picture}; give --crop too")));
+            return Err(refused(
+                "size",
+                format!(": the scene's crop {numbers} reaches beyond {picture}; give `crop` too"),
+            ));
         }
     }
     Ok(crop)
 }
 
-/// The number of threads that `--threads` means; without it, or with 0, all that the process may use.
+/// The number of threads that is requested; without it, or with 0, all that the process may use.
 ///
 /// # Errors
-/// [`Error::Usage`] if there are too many.
+/// [`Error::Setting`] if there are too many.
 pub fn threads(requested: Option<usize>) -> Result<usize> {
     match requested.unwrap_or(0) {
         0 => Ok(std::thread::available_parallelism().map_or(1, NonZero::get)),
-        threads if threads > MAX_THREADS => Err(usage(format!("--threads {threads}: at most {MAX_THREADS}"))),
+        threads if threads > MAX_THREADS => Err(refused("threads", format!(" {threads}: at most {MAX_THREADS}"))),
         threads => Ok(threads),
     }
 }
@@ -198,7 +212,7 @@ pub fn threads(requested: Option<usize>) -> Result<usize> {
 fn target_error(overrides: &Overrides) -> Result<Option<f64>> {
     match overrides.target_error {
         Some(error) if !(error > 0.0 && error < f64::INFINITY) => {
-            Err(usage(format!("--target-error {error}: a relative squared error above 0, such as 0.01")))
+            Err(refused("target_error", format!(" {error}: a relative squared error above 0, such as 0.01")))
         }
         target => Ok(target),
     }
@@ -207,7 +221,7 @@ fn target_error(overrides: &Overrides) -> Result<Option<f64>> {
 fn time_limit(overrides: &Overrides) -> Result<Option<Duration>> {
     let Some(seconds) = overrides.time_limit else { return Ok(None) };
     let limit = Duration::try_from_secs_f64(seconds).ok().filter(|limit| !limit.is_zero());
-    limit.map(Some).ok_or_else(|| usage(format!("--time-limit {seconds}: a number of seconds above 0")))
+    limit.map(Some).ok_or_else(|| refused("time_limit", format!(" {seconds}: a number of seconds above 0")))
 }
 
 fn outputs(desc: &SceneDesc, overrides: &Overrides, integrator: &IntegratorDesc) -> Result<Vec<OutputDesc>> {
@@ -220,21 +234,21 @@ fn outputs(desc: &SceneDesc, overrides: &Overrides, integrator: &IntegratorDesc)
         by_name(&overrides.default_outputs)
     };
     let has_extension = |output: &OutputDesc, extension: &str| output.file.to_ascii_lowercase().ends_with(extension);
-    let needs = |option: &str, given: bool, extension: &str| {
+    let needs = |setting: &'static str, given: bool, extension: &str| {
         if given && !outputs.iter().any(|output| has_extension(output, extension)) {
-            return Err(usage(format!("{option} has no effect: no output is an {extension} file")));
+            return Err(refused(setting, format!(" has no effect: no output is an {extension} file")));
         }
         Ok(())
     };
-    needs("--layers", !overrides.layers.is_empty(), ".exr")?;
-    needs("--float", overrides.float, ".exr")?;
-    if let Some(option) = overrides.exr.given() {
-        needs(option, true, ".exr")?;
+    needs("layers", !overrides.layers.is_empty(), ".exr")?;
+    needs("float", overrides.float, ".exr")?;
+    if let Some(setting) = overrides.exr.given() {
+        needs(setting, true, ".exr")?;
     }
-    needs("--exposure", overrides.exposure.is_some(), ".png")?;
-    needs("--view", overrides.view.is_some(), ".png")?;
+    needs("exposure", overrides.exposure.is_some(), ".png")?;
+    needs("view", overrides.view.is_some(), ".png")?;
     if overrides.exposure.is_some_and(|stops| !stops.is_finite()) {
-        return Err(usage("--exposure: a finite number of stops"));
+        return Err(refused("exposure", ": a finite number of stops"));
     }
     for output in &mut outputs {
         if has_extension(output, ".exr") {
@@ -259,7 +273,6 @@ fn outputs(desc: &SceneDesc, overrides: &Overrides, integrator: &IntegratorDesc)
 mod tests {
     use super::*;
     use crate::desc::{RouletteDesc, SamplerKindDesc, StrategyDesc};
-    use crate::film::LayerKind;
 
     fn scene(text: &str) -> SceneDesc {
         serde_json::from_str(text).unwrap()
@@ -267,7 +280,10 @@ mod tests {
 
     fn refusal(desc: &SceneDesc, overrides: &Overrides) -> String {
         match Settings::new(desc, overrides) {
-            Err(Error::Usage(message)) => message,
+            Err(Error::Setting { setting, message }) => {
+                assert!(message.starts_with(&format!("`{setting}`")), "{message}");
+                setting.to_owned()
+            }
             other => panic!("{other:?}"),
         }
     }
@@ -385,42 +401,38 @@ mod tests {
     }
 
     #[test]
-    fn impossible_changes_are_refused_by_the_options_name() {
+    fn impossible_changes_are_refused_by_the_settings_name() {
         let desc = scene(SCENE);
         let d = Overrides::default;
         let cases = [
-            ("--spp", Overrides { spp: Some(0), ..d() }),
-            ("--target-error", Overrides { target_error: Some(0.0), ..d() }),
-            ("--target-error", Overrides { target_error: Some(f64::NAN), ..d() }),
-            ("--size", Overrides { size: Some([0, 5]), ..d() }),
-            ("--size", Overrides { size: Some([1 << 20, 5]), ..d() }),
-            ("--size", Overrides { size: Some([20, 20]), ..d() }),
-            ("--crop", Overrides { crop: Some([90, 0, 11, 5]), ..d() }),
-            ("--crop", Overrides { crop: Some([0, 0, 0, 5]), ..d() }),
-            ("--threads", Overrides { threads: Some(1 << 20), ..d() }),
-            ("--max-depth", Overrides { max_depth: Some(0), ..d() }),
-            ("--max-depth", Overrides { max_depth: Some(3), integrator: Some(IntegratorDesc::Normal), ..d() }),
-            (
-                "--strategy",
-                Overrides { strategy: Some(StrategyDesc::Bsdf), integrator: Some(IntegratorDesc::Uv), ..d() },
-            ),
-            ("--clamp", Overrides { clamp: Some(0.0), ..d() }),
-            ("--clamp", Overrides { clamp: Some(f32::NAN), ..d() }),
-            ("--clamp", Overrides { clamp: Some(1.0), integrator: Some(IntegratorDesc::Uv), ..d() }),
-            ("--regularize", Overrides { regularize: Some(-0.1), ..d() }),
-            ("--regularize", Overrides { regularize: Some(f32::NAN), ..d() }),
-            ("--regularize", Overrides { regularize: Some(0.1), integrator: Some(IntegratorDesc::Uv), ..d() }),
-            ("--time-limit", Overrides { time_limit: Some(0.0), ..d() }),
-            ("--time-limit", Overrides { time_limit: Some(f64::NAN), ..d() }),
-            ("--layers", Overrides { layers: vec![LayerKind::Z], outputs: vec!["a.png".to_owned()], ..d() }),
-            ("--float", Overrides { float: true, outputs: vec!["a.png".to_owned()], ..d() }),
-            ("--exposure", Overrides { exposure: Some(1.0), outputs: vec!["a.exr".to_owned()], ..d() }),
-            ("--exposure", Overrides { exposure: Some(f32::INFINITY), ..d() }),
-            ("--view", Overrides { view: Some(ViewDesc::Agx), outputs: vec!["a.exr".to_owned()], ..d() }),
+            ("spp", Overrides { spp: Some(0), ..d() }),
+            ("target_error", Overrides { target_error: Some(0.0), ..d() }),
+            ("target_error", Overrides { target_error: Some(f64::NAN), ..d() }),
+            ("size", Overrides { size: Some([0, 5]), ..d() }),
+            ("size", Overrides { size: Some([1 << 20, 5]), ..d() }),
+            ("size", Overrides { size: Some([20, 20]), ..d() }),
+            ("crop", Overrides { crop: Some([90, 0, 11, 5]), ..d() }),
+            ("crop", Overrides { crop: Some([0, 0, 0, 5]), ..d() }),
+            ("threads", Overrides { threads: Some(1 << 20), ..d() }),
+            ("max_depth", Overrides { max_depth: Some(0), ..d() }),
+            ("max_depth", Overrides { max_depth: Some(3), integrator: Some(IntegratorDesc::Normal), ..d() }),
+            ("strategy", Overrides { strategy: Some(StrategyDesc::Bsdf), integrator: Some(IntegratorDesc::Uv), ..d() }),
+            ("clamp", Overrides { clamp: Some(0.0), ..d() }),
+            ("clamp", Overrides { clamp: Some(f32::NAN), ..d() }),
+            ("clamp", Overrides { clamp: Some(1.0), integrator: Some(IntegratorDesc::Uv), ..d() }),
+            ("regularize", Overrides { regularize: Some(-0.1), ..d() }),
+            ("regularize", Overrides { regularize: Some(f32::NAN), ..d() }),
+            ("regularize", Overrides { regularize: Some(0.1), integrator: Some(IntegratorDesc::Uv), ..d() }),
+            ("time_limit", Overrides { time_limit: Some(0.0), ..d() }),
+            ("time_limit", Overrides { time_limit: Some(f64::NAN), ..d() }),
+            ("layers", Overrides { layers: vec![LayerKind::Z], outputs: vec!["a.png".to_owned()], ..d() }),
+            ("float", Overrides { float: true, outputs: vec!["a.png".to_owned()], ..d() }),
+            ("exposure", Overrides { exposure: Some(1.0), outputs: vec!["a.exr".to_owned()], ..d() }),
+            ("exposure", Overrides { exposure: Some(f32::INFINITY), ..d() }),
+            ("view", Overrides { view: Some(ViewDesc::Agx), outputs: vec!["a.exr".to_owned()], ..d() }),
         ];
-        for (option, overrides) in cases {
-            let message = refusal(&desc, &overrides);
-            assert!(message.starts_with(option), "{message}");
+        for (setting, overrides) in cases {
+            assert_eq!(refusal(&desc, &overrides), setting);
         }
     }
 }

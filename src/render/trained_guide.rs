@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use super::settings::refused;
 use super::state::read_guide;
 use crate::bytes::ByteWriter;
 use crate::error::{Error, Result};
@@ -24,7 +25,7 @@ pub struct TrainedGuide {
 }
 
 impl TrainedGuide {
-    /// The guide in the checkpoint of a render with `--guiding on`.
+    /// The guide in the checkpoint of a render with `guiding`.
     ///
     /// # Errors
     /// [`Error::Missing`] if the file cannot be read; [`Error::Checkpoint`] if it is damaged, of a render without
@@ -37,13 +38,14 @@ impl TrainedGuide {
         Ok(Self { digest, guide: Some(Arc::new(guide.into_trained())) })
     }
 
-    /// This guide, read from the checkpoint that `--guide` names.
+    /// This guide, read from the checkpoint of this name.
     ///
     /// # Errors
-    /// As [`read`](Self::read); [`Error::Usage`] if no file is named; [`Error::Checkpoint`] if it holds another guide.
+    /// As [`read`](Self::read); [`Error::Setting`] if no file is named; [`Error::Checkpoint`] if it holds another
+    /// guide.
     pub fn reload(&self, checkpoint: Option<&Path>) -> Result<Self> {
         let checkpoint = checkpoint.ok_or_else(|| {
-            Error::Usage("--guide: the picture was rendered with a guide; give the checkpoint that holds it".into())
+            refused("guide", ": the picture was rendered with a guide; give the checkpoint that holds it")
         })?;
         let read = Self::read(checkpoint)?;
         if read.digest != self.digest {

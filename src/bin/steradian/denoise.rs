@@ -2,55 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::{Value, json};
-use steradian::denoise::{self, Denoiser, FileOptions, Report, denoise_file};
-use steradian::desc::FilterSamplesDesc;
-use steradian::film::{Filter, Image};
+use steradian::denoise::{Denoiser, FileOptions, Report, denoise_file};
+use steradian::film::Filter;
 use steradian::output::{self, FileUses, Format};
-use steradian::render::{Progress, Settings};
 use steradian::{Error, Result};
 
-use crate::args::{DenoiseArgs, RenderDenoiseArgs};
+use crate::args::DenoiseArgs;
 use crate::log::{self, Level};
-use crate::progress::Reporter;
 use crate::text;
-
-/// The denoiser of a render, if it is requested: opened before the render, so that a missing library is an error at the
-/// start.
-pub fn prepare(arguments: &RenderDenoiseArgs, settings: &mut Settings) -> Result<Option<Denoiser>> {
-    if !arguments.denoise {
-        return Ok(None);
-    }
-    denoise::add_features(&mut settings.layers);
-    settings.filter.samples_mut().get_or_insert(FilterSamplesDesc::Importance);
-    Denoiser::open(arguments.oidn.oidn_library.as_deref(), settings.threads).map(Some)
-}
-
-/// What became of a render's picture.
-#[derive(Default)]
-pub struct Denoised {
-    /// Attributes for files.
-    pub texts: Vec<(String, String)>,
-    /// For scripts; null if nothing was denoised.
-    pub statistics: Value,
-    /// Why the picture is as noisy as it was.
-    pub failure: Option<Error>,
-}
-
-/// Denoises a render's picture. If that fails, the picture is not lost: it is written as it is before the program ends
-/// with the failure.
-pub fn finish(denoiser: Option<&Denoiser>, image: &mut Image, reporter: &Reporter) -> Denoised {
-    let Some(denoiser) = denoiser else { return Denoised::default() };
-    match denoise::denoise_image(denoiser, image) {
-        Ok(report) => {
-            warnings(&report).iter().for_each(|warning| reporter.warn(warning));
-            reporter.say(&format!("denoised: {}", summary(&report)));
-            let texts = vec![(Report::ATTRIBUTE.to_owned(), report.attribute())];
-            Denoised { texts, statistics: value(&report, denoiser), failure: None }
-        }
-        Err(error) => Denoised { failure: Some(error), ..Denoised::default() },
-    }
-}
 
 /// Denoises a file, or every frame of a sequence.
 pub fn run(arguments: &DenoiseArgs, mut uses: FileUses) -> Result<()> {
@@ -84,7 +43,7 @@ pub fn run(arguments: &DenoiseArgs, mut uses: FileUses) -> Result<()> {
         warnings(&report).iter().for_each(|warning| log::message(Level::Warning, &format!("{input}: {warning}")));
         log::message(Level::Note, &format!("wrote {}: {}", task.output.display(), summary(&report)));
         if arguments.json {
-            let mut value = value(&report, &denoiser);
+            let mut value = report.statistics(denoiser.library());
             value["input"] = task.input.display().to_string().into();
             value["output"] = task.output.display().to_string().into();
             text::print_json(&value)?;
@@ -104,19 +63,6 @@ fn shares_samples(file: &Path) -> bool {
 pub fn summary(report: &Report) -> String {
     let layers = if report.layers.len() == 1 { String::new() } else { format!(", {} layers", report.layers.len()) };
     format!("{}{layers}, {:.2} s", report.attribute(), report.seconds)
-}
-
-/// What was done, for scripts.
-pub fn value(report: &Report, denoiser: &Denoiser) -> Value {
-    json!({
-        "denoised": report.attribute(),
-        "library": denoiser.library().display().to_string(),
-        "version": report.version,
-        "seconds": report.seconds,
-        "layers": report.layers,
-        "cleaned_pixels": report.cleaned,
-        "negative_pixels": report.negative,
-    })
 }
 
 /// Warnings about a picture.

@@ -26,9 +26,7 @@ mod progress;
 mod render;
 mod rerender;
 mod scene;
-mod set;
 mod skipped;
-mod stats;
 mod text;
 
 use std::path::Path;
@@ -139,11 +137,26 @@ fn exit_code(kind: ErrorKind) -> u8 {
 
 /// The error and what caused it, in one line.
 fn chain(error: &Error) -> String {
-    let mut line = error.to_string();
+    let mut line = match error {
+        // What follows is in the words of the scene format.
+        Error::Setting { setting: "set", message } => message.replacen("`set`", "--set", 1),
+        Error::Setting { message, .. } => with_options(message),
+        _ => error.to_string(),
+    };
     let mut source = std::error::Error::source(error);
     while let Some(cause) = source {
         line.push_str(&format!(": {cause}"));
         source = cause.source();
+    }
+    line
+}
+
+/// A message in which settings such as `` `max_depth` `` are the options that set them, such as `--max-depth`.
+fn with_options(message: &str) -> String {
+    let render = Cli::command().find_subcommand("render").cloned().unwrap_or_default();
+    let mut line = message.to_owned();
+    for option in render.get_arguments().filter_map(clap::Arg::get_long) {
+        line = line.replace(&format!("`{}`", option.replace('-', "_")), &format!("--{option}"));
     }
     line
 }

@@ -267,6 +267,10 @@ impl Progress for Reporter {
         }
     }
 
+    fn note(&self, message: &str) {
+        self.say(message);
+    }
+
     fn warn(&self, message: &str) {
         log::message(Level::Warning, message);
         self.emit(&Event::Warning(message));

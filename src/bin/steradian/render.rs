@@ -1,79 +1,65 @@
 //! `steradian render`.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
-use steradian::Result;
-use steradian::accel::{self, Accelerator};
+use serde_json::Value;
 use steradian::compile::CheckedScene;
-use steradian::denoise::Denoiser;
 use steradian::farm::check_single_name;
-use steradian::film::LayerSet;
 use steradian::live::{Fan, Live};
-use steradian::output::{self, RenderInfo, RenderStatistics};
-use steradian::render::{
-    self, DEFAULT_EXTENSIONS, Header, Progress, RenderProvenance, RenderResult, RenderSession, Replayed, Settings,
-    Stats, TrainedGuide,
+use steradian::output;
+use steradian::render::{self, Progress, RenderProvenance, Replayed, Settings, Stats, TrainedGuide};
+use steradian::{
+    PreparedRender, Renderer, Rendering, Result, StateOptions, StopHandle, Watch, changed_settings, default_outputs,
 };
-use steradian::scene::Scene;
 
 use crate::args::RenderArgs;
 use crate::denoise;
 use crate::frames::{Session, Shot};
-use crate::kept::{self, Resumable};
+use crate::kept;
 use crate::progress::Reporter;
 use crate::rerender;
-use crate::set;
 use crate::skipped::Skipped;
-use crate::stats::{self, Run};
 use crate::text::counted;
 use crate::{files, text};
 
 /// Renders a picture and writes its outputs; the result is the exit code. `start` is when the scene's reading began.
 pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Instant) -> Result<u8> {
-    let checked = CheckedScene::new(&shot.imported.desc, shot.imported.source(&shot.scene))?;
-    let Some(mut plan) = Plan::new(arguments, &shot, session)? else {
+    CheckedScene::new(&shot.imported.desc, shot.imported.source(&shot.scene))?;
+    let Some(plan) = Plan::new(arguments, &shot, session)? else {
         session.reporter.complete_frame();
         return Ok(0);
     };
-    let mut scene = checked.compile()?;
-    if !plan.settings.depth_of_field {
-        scene.camera.remove_lens();
-    }
-    let header = plan.header(&shot, &scene)?;
-    // Descriptions of meshes take as much memory as the meshes.
-    drop(shot);
-    let load_seconds = start.elapsed().as_secs_f64();
-
-    let start = Instant::now();
-    let accel = accel::build(plan.settings.accel, &scene.geometry, plan.settings.threads)?;
-    let build_seconds = start.elapsed().as_secs_f64();
-    let run = Run { scene: &plan.scene_file.clone(), accel: &*accel, load_seconds, build_seconds };
-    tracing::info!("{}; {load_seconds:.3} s to load, {:.3} s to build", accel.description(), run.build_seconds);
-
+    let Shot { imported, scene, .. } = shot;
+    let mut renderer = plan.renderer(Renderer::from_imported(imported, scene).started_at(start));
     if let (Some(pixel), Some(sample)) = (arguments.pixel, arguments.sample) {
-        plan.settings.layers = LayerSet::FULL;
-        let value = render::replay(&scene, &*accel, &plan.settings, pixel, sample)?;
+        let value = renderer.replay(pixel, sample)?;
         return text::print(&describe_sample(&value)).map(|()| 0);
     }
+    let mut prepared = renderer.prepare()?;
+    let [load_seconds, build_seconds] = prepared.seconds();
+    let accel = prepared.accel().description();
+    tracing::info!("{accel}; {load_seconds:.3} s to load, {build_seconds:.3} s to build");
 
     let interrupt = session.interrupt()?;
-    let live = plan.watch(session)?;
-    let result = plan.render(&scene, &*accel, header.as_ref(), session, &live)?;
-    let first = load_seconds + run.build_seconds + result.stats.first_pass_seconds;
-    tracing::info!("{first:.3} s until every pixel had its first sample");
-    warn_of_dropped(&result.stats, &session.reporter);
-    let exit_code = if result.stats.interrupted { interrupt.exit_code() } else { 0 };
-    if let (Some(frame), true) = (plan.frame, result.stats.interrupted) {
+    let live = plan.watch(prepared.settings(), session)?;
+    let rendering = plan.render(&mut prepared, session, &live)?;
+    let stats = rendering.stats();
+    tracing::info!("{:.3} s until every pixel had its first sample", rendering.first_pass_seconds());
+    warn_of_dropped(stats, &session.reporter);
+    let exit_code = if stats.interrupted { interrupt.exit_code() } else { 0 };
+    if let (Some(frame), true) = (plan.frame, stats.interrupted) {
         // A file that is there counts as a complete frame.
         session.reporter.say(&format!("interrupted: frame {frame} is not written"));
         return Ok(exit_code);
     }
-    if result.stats.interrupted && result.stats.spp_done == 0 && plan.shard_file.is_none() {
+    if stats.interrupted && stats.spp_done == 0 && plan.shard_file.is_none() {
         session.reporter.say("interrupted before every pixel had a sample: nothing is written");
         return Ok(exit_code);
     }
-    plan.write(&scene, result, &run, session, &live)?;
+    plan.write(&prepared, rendering, session, &live)?;
     if arguments.live.preview_hold {
         interrupt.wait();
     }
@@ -90,9 +76,8 @@ struct Plan<'a> {
     json: Option<PathBuf>,
     /// Where the shard goes, if the render is of one.
     shard_file: Option<PathBuf>,
+    checkpoint: Option<PathBuf>,
     provenance: Option<RenderProvenance>,
-    denoiser: Option<Denoiser>,
-    kept: Option<Resumable<'a>>,
 }
 
 impl<'a> Plan<'a> {
@@ -110,12 +95,7 @@ impl<'a> Plan<'a> {
             }
             None => {
                 overrides.guide = arguments.guide.as_deref().map(TrainedGuide::read).transpose()?;
-                let desc = &shot.imported.desc;
-                if arguments.set.is_empty() {
-                    Settings::new(desc, &overrides)?
-                } else {
-                    Settings::new(&set::changed(desc, &arguments.set)?, &overrides)?
-                }
+                changed_settings(&shot.imported.desc, &arguments.set, &overrides)?
             }
         };
         if arguments.pixel.is_none() {
@@ -143,126 +123,86 @@ impl<'a> Plan<'a> {
             }
             check_outputs(&settings, shard_file.as_deref(), json.as_deref())?;
         }
-        let denoiser = denoise::prepare(&arguments.denoise, &mut settings)?;
         let checkpoint = arguments.state.checkpoint.as_deref().map(|path| shot.file_of(path));
-        let kept = match arguments.pixel {
-            None => Resumable::new(&arguments.state, &settings, shard_file.as_deref(), checkpoint.as_deref())?,
-            Some(_) => None,
-        };
         let (scene_file, frame) = (shot.scene.clone(), shot.frame);
-        Ok(Some(Self { arguments, settings, scene_file, frame, json, shard_file, provenance, denoiser, kept }))
+        Ok(Some(Self { arguments, settings, scene_file, frame, json, shard_file, checkpoint, provenance }))
     }
 
-    /// The metadata of files that is known before the render.
-    fn info(&self, scene: &Scene) -> RenderInfo {
-        RenderInfo {
-            world_to_camera: Some(scene.camera.world_to_camera()),
-            world_to_ndc: scene.camera.world_to_ndc(self.settings.size),
-            pixel_aspect: Some(scene.camera.framing().pixel_aspect as f32),
-            identities: self.settings.layers.needs_coverage().then(|| scene.identities.clone()),
-            settings: self.provenance.as_ref().map(RenderProvenance::to_value),
-            statistics: Some(RenderStatistics { threads: self.settings.threads, ..RenderStatistics::default() }),
-            ..RenderInfo::default()
-        }
-    }
-
-    /// The header of the render's state, if it is kept.
-    fn header(&self, shot: &Shot, scene: &Scene) -> Result<Option<Header>> {
-        let header =
-            |kept: &Resumable| kept.header(&shot.imported, &shot.scene, scene, &self.settings, self.info(scene));
-        self.kept.as_ref().map(header).transpose()
+    /// The renderer of the scene, as the command line has it.
+    fn renderer(&self, renderer: Renderer) -> Renderer {
+        let state = &self.arguments.state;
+        let renderer =
+            renderer.with_settings(self.settings.clone()).with_recipe(self.provenance.clone()).state(StateOptions {
+                checkpoint: self.checkpoint.clone(),
+                every: state.every,
+                resume: state.resume,
+                shard: state.shard.unwrap_or_default(),
+                shard_file: self.shard_file.clone(),
+            });
+        let denoise = &self.arguments.denoise;
+        if denoise.denoise { renderer.denoise(denoise.oidn.oidn_library.clone()) } else { renderer }
     }
 
     /// Starts what shows the picture on its way.
-    fn watch(&self, session: &Session) -> Result<Live> {
-        session.reporter.limit_time(self.settings.time_limit);
-        let live = self.arguments.live.start(&self.scene_file, &self.settings)?;
+    fn watch(&self, settings: &Settings, session: &Session) -> Result<Live> {
+        session.reporter.limit_time(settings.time_limit);
+        let live = self.arguments.live.start(&self.scene_file, settings)?;
         if let Some(url) = live.preview_url() {
             session.reporter.say(&format!("preview: {url}"));
         }
         Ok(live)
     }
 
-    fn render(
-        &mut self,
-        scene: &Scene,
-        accel: &dyn Accelerator,
-        header: Option<&Header>,
-        session: &Session,
-        live: &Live,
-    ) -> Result<RenderResult> {
+    fn render(&self, prepared: &mut PreparedRender, session: &Session, live: &Live) -> Result<Rendering> {
         let (reporter, interrupt) = (&session.reporter, session.interrupt()?);
         let fan = Fan::new([reporter as &dyn Progress, live]);
-        if let (Some(kept), Some(header)) = (self.kept.take(), header) {
-            let session =
-                RenderSession { scene, accel, settings: &self.settings, progress: &fan, stop: &interrupt.stop };
-            return kept.render(&session, header, reporter, interrupt);
+        let stop = StopHandle::from(Arc::clone(&interrupt.stop));
+        let rendering = prepared.render(&Watch { progress: &fan, stop: &stop, checkpoint: &interrupt.checkpoint })?;
+        if self.checkpoint.is_none() && self.shard_file.is_none() {
+            kept::warn_of_request(interrupt, reporter);
         }
-        let result = render::render(scene, accel, &self.settings, &fan, &interrupt.stop)?;
-        kept::warn_of_request(interrupt, reporter);
-        Ok(result)
+        Ok(rendering)
     }
 
     /// Denoises the picture, and writes all files. One that cannot be written is no reason to lose the others.
-    fn write(
-        &self,
-        scene: &Scene,
-        RenderResult { mut image, stats }: RenderResult,
-        run: &Run,
-        session: &Session,
-        live: &Live,
-    ) -> Result<()> {
-        let accel = run.accel;
-        let denoised = denoise::finish(
-            self.denoiser.as_ref().filter(|_| self.shard_file.is_none()),
-            &mut image,
-            &session.reporter,
-        );
-        let info = RenderInfo {
-            samples_per_pixel: stats.spp_done,
-            render_seconds: stats.render_seconds,
-            statistics: Some(RenderStatistics {
-                threads: self.settings.threads,
-                rays: stats.rays.total(),
-                nan_samples: stats.nan_samples,
-            }),
-            settings: self.provenance.clone().map(|provenance| provenance.with_samples(stats.spp_done).to_value()),
-            texts: denoised.texts,
-            ..self.info(scene)
-        };
-        let mut failure = denoised.failure;
+    fn write(&self, prepared: &PreparedRender, mut rendering: Rendering, session: &Session, live: &Live) -> Result<()> {
+        let mut failure = prepared.denoise(&mut rendering).err();
+        if let Some(report) = rendering.denoised() {
+            denoise::warnings(report).iter().for_each(|warning| session.reporter.warn(warning));
+            session.reporter.say(&format!("denoised: {}", denoise::summary(report)));
+        }
         let mut written = Vec::new();
         if let Some(file) = &self.shard_file {
             // One that is to be taken up again is not written.
-            if !(stats.interrupted && self.arguments.state.checkpoint.is_some()) {
+            if !(rendering.stats().interrupted && self.checkpoint.is_some()) {
                 written.push(file.display().to_string());
             }
         } else {
-            for desc in &self.settings.outputs {
-                match output::write(desc, &image, &info) {
-                    Ok(()) => written.push(desc.file.clone()),
+            for (file, result) in rendering.save_outputs() {
+                match result {
+                    Ok(()) => written.push(file),
                     Err(error) => failure = failure.or(Some(error)),
                 }
             }
-            live.show_final(&image, stats.spp_done);
+            live.show_final(rendering.image(), rendering.stats().spp_done);
         }
         if let Some(path) = &self.json {
-            let mut value = stats::value(run, &self.settings, &stats);
-            value["denoise"] = denoised.statistics;
-            stats::write(path, &value)?;
+            write_statistics(path, &rendering.statistics())?;
         }
-        report(&session.reporter, &self.settings, accel, &stats, &written);
-        if failure.is_none() && !stats.interrupted {
+        report(&session.reporter, &rendering, &written);
+        if failure.is_none() && !rendering.stats().interrupted {
             session.reporter.complete_frame();
         }
         failure.map_or(Ok(()), Err)
     }
 }
 
-/// Files named after the scene, in the working directory.
-pub fn default_outputs(scene: &Path) -> Vec<String> {
-    let stem = scene.file_stem().map_or("picture".into(), |stem| stem.to_string_lossy().into_owned());
-    DEFAULT_EXTENSIONS.iter().map(|extension| format!("{stem}.{extension}")).collect()
+/// Writes statistics to a file, whole or not at all, or to stdout for `-`.
+fn write_statistics(path: &Path, value: &Value) -> Result<()> {
+    if path == Path::new("-") {
+        return text::print_json(value);
+    }
+    output::write_atomically(path, |out| writeln!(out, "{value:#}").map_err(|e| e.to_string()))
 }
 
 /// Names that are given, and not after the scene, have no place for a frame's number.
@@ -299,7 +239,8 @@ fn warn_of_dropped(stats: &Stats, reporter: &Reporter) {
     ));
 }
 
-fn report(reporter: &Reporter, settings: &Settings, accel: &dyn Accelerator, stats: &Stats, written: &[String]) {
+fn report(reporter: &Reporter, rendering: &Rendering, written: &[String]) {
+    let (settings, stats) = (rendering.settings(), rendering.stats());
     let seconds = stats.render_seconds.max(1e-9);
     let ended = match (stats.interrupted, stats.time_limited) {
         (true, _) => " (interrupted)",
@@ -315,7 +256,7 @@ fn report(reporter: &Reporter, settings: &Settings, accel: &dyn Accelerator, sta
         stats.samples as f64 / seconds * 1e-6,
         stats.rays.total() as f64 / seconds * 1e-6,
         counted(settings.threads as u64, "thread"),
-        accel.description(),
+        rendering.accelerator(),
     ));
     if let (Some(error), Some(target)) = (stats.estimated_error, settings.target_error) {
         reporter.say(&format!("relative squared error about {error:.3e}, target {target:.3e}"));

@@ -7,6 +7,7 @@ use steradian::desc::OutputDesc;
 use steradian::farm::FrameList;
 use steradian::output::{self, Format};
 use steradian::render::{Progress, RenderProvenance, Settings};
+use steradian::{changed_settings, default_outputs};
 
 use crate::args::RenderArgs;
 use crate::frames::{Session, Shot};
@@ -95,7 +96,7 @@ pub fn warn(
 
 /// The settings that a frame would be rendered with, as they are for all frames.
 fn settings(arguments: &RenderArgs, shot: &Shot) -> Option<Settings> {
-    let mut overrides = arguments.overrides(crate::render::default_outputs(&arguments.scene));
+    let mut overrides = arguments.overrides(default_outputs(&arguments.scene));
     kept::take_shard_name(&arguments.state, &arguments.scene, &mut overrides).ok()?;
-    Settings::new(&shot.imported.desc, &overrides).ok()
+    changed_settings(&shot.imported.desc, &arguments.set, &overrides).ok()
 }

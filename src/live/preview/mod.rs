@@ -15,7 +15,8 @@ use std::time::{Duration, Instant};
 
 use super::{Snapshot, Statistics};
 use crate::desc::ViewDesc;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::render::refused;
 use board::Board;
 pub use http::HttpTimeouts;
 use http::{Connection, HttpError};
@@ -74,10 +75,10 @@ impl Preview {
     /// Starts to serve; the picture is called `name`.
     ///
     /// # Errors
-    /// [`Error::Usage`] if the address and port are not to be had.
+    /// [`Error::Setting`](crate::Error::Setting) if the address and port are not to be had.
     pub fn new(options: &PreviewOptions, name: String, statistics: Arc<Statistics>) -> Result<Self> {
         let unusable = |e: &dyn std::fmt::Display| {
-            Error::Usage(format!("--preview: cannot listen at {}:{}: {e}", options.host, options.port))
+            refused("preview", format!(": cannot listen at {}:{}: {e}", options.host, options.port))
         };
         let host = options.host.trim_start_matches('[').trim_end_matches(']');
         let addresses: Vec<_> = (host, options.port).to_socket_addrs().map_err(|e| unusable(&e))?.collect();

@@ -24,8 +24,9 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::planner::Planner;
+use super::settings::refused;
 use super::{Settings, TILE_SIZE};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::film::{Film, FilmTile, Image};
 use crate::integrator::RayCounts;
 use crate::scene::Scene;
@@ -89,8 +90,8 @@ impl RenderState {
     /// Continues from the state in a file.
     ///
     /// # Errors
-    /// [`Error::Missing`] if it cannot be read, [`Error::Checkpoint`] if it is damaged or
-    /// belongs to another picture than `header`.
+    /// [`Error::Missing`](crate::Error::Missing) if it cannot be read, [`Error::Checkpoint`](crate::Error::Checkpoint)
+    /// if it is damaged or belongs to another picture than `header`.
     pub fn read(path: &Path, header: &Header, scene: &Scene, settings: &Settings) -> Result<Self> {
         let mut reader = Reader::open(path)?;
         fits(&reader, header)?;
@@ -213,25 +214,26 @@ fn fits(reader: &Reader, requested: &Header) -> Result<()> {
 /// Whether the state of a render can be kept, and the render be split.
 ///
 /// # Errors
-/// [`Error::Usage`] naming the option if not.
+/// [`Error::Setting`](crate::Error::Setting) if not.
 pub fn check_resumable(settings: &Settings, shard: Shard) -> Result<()> {
     if shard != Shard::WHOLE && settings.is_guided() {
-        return Err(Error::Usage(
-            "--shard: not with guiding, for paths learn from nearly all samples before, which each part would render; \
-             give --guiding off, or --guide with the checkpoint of a guided render"
-                .into(),
+        return Err(refused(
+            "shard",
+            ": not with guiding, for paths learn from nearly all samples before, which each part would render; \
+             give `guiding` off, or `guide` with the checkpoint of a guided render",
         ));
     }
     if shard != Shard::WHOLE && settings.target_error.is_some() {
-        return Err(Error::Usage(
-            "--shard: not with --target-error, for each part would need the others' samples; give --spp".into(),
+        return Err(refused(
+            "shard",
+            ": not with `target_error`, for each part would need the others' samples; give `spp`",
         ));
     }
     if shard.samples(settings.spp).is_empty() {
-        return Err(Error::Usage(format!(
-            "--shard {shard}: there are only {} samples per pixel to share out",
-            settings.spp
-        )));
+        return Err(refused(
+            "shard",
+            format!(" {shard}: there are only {} samples per pixel to share out", settings.spp),
+        ));
     }
     Ok(())
 }

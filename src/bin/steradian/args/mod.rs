@@ -21,13 +21,13 @@ use std::path::PathBuf;
 
 use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
+use steradian::Assignment;
 use steradian::accel::AccelKind;
 use steradian::desc::{CausticsDesc, IntegratorDesc, RouletteDesc, SamplerKindDesc, StrategyDesc, ViewDesc};
 use steradian::render::Overrides;
 
 use crate::names::{self, Layers};
 use crate::rerender::Repeat;
-use crate::set::Assignment;
 #[cfg(feature = "bench")]
 pub use bench::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityArgs};
 #[cfg(feature = "bench")]

@@ -1,15 +1,19 @@
-//! `--set KEY=VALUE`: keys of a scene's film, sampler and integrator, changed for one render.
+//! Keys of a scene's film, sampler and integrator, changed for one render.
 
 use std::path::Path;
 
+use crate::compile::check_film_and_integrator;
+use crate::desc::SceneDesc;
+use crate::error::{Error, Result};
+use crate::import::parse_scene;
+use crate::render::{Overrides, Settings, refused};
 use serde_json::{Map, Value, json};
-use steradian::desc::SceneDesc;
-use steradian::{Error, Result, compile, import};
 
-/// The parts of a scene that can be changed: what EXR files hold of a render for `rerender`.
+/// The parts of a scene that can be changed: what EXR files hold of a render.
 const PARTS: [&str; 3] = ["film", "sampler", "integrator"];
 
-/// A key of the scene format, such as `integrator.clamp`, and its value.
+/// A key of the scene format below `film`, `sampler` or `integrator`, such as `integrator.clamp`, and its value. Parsed
+/// from `KEY=VALUE`, where the value is JSON or a word.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Assignment {
     key: String,
@@ -23,21 +27,47 @@ impl std::str::FromStr for Assignment {
         let form = "expected KEY=VALUE, such as integrator.clamp=10";
         let (key, value) = text.split_once('=').ok_or(form)?;
         let (key, value) = (key.trim(), value.trim());
+        // What is no JSON is a word, which needs no quotes here.
+        let value = serde_json::from_str(value).unwrap_or_else(|_| value.into());
+        Self::new(key, value).map_err(|_| format!("{form}; {KEYS}"))
+    }
+}
+
+/// Which keys can be set.
+const KEYS: &str = "keys begin with film., sampler. or integrator.";
+
+impl Assignment {
+    /// The value of a key.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] if the key is of another part of the scene.
+    pub fn new(key: &str, value: Value) -> Result<Self> {
         let part = key.split('.').next().unwrap_or_default();
         if !PARTS.contains(&part) || !key.contains('.') {
-            return Err(format!("{form}; keys begin with film., sampler. or integrator."));
+            return Err(refused("set", format!(" {key}: {KEYS}")));
         }
-        // What is no JSON is a word, which needs no quotes here.
-        Ok(Self { key: key.to_owned(), value: serde_json::from_str(value).unwrap_or_else(|_| value.into()) })
+        Ok(Self { key: key.to_owned(), value })
+    }
+}
+
+/// The settings of a scene with some of its keys set, and then with overrides.
+///
+/// # Errors
+/// [`Error::Setting`] if a change is impossible.
+pub fn changed_settings(desc: &SceneDesc, assignments: &[Assignment], overrides: &Overrides) -> Result<Settings> {
+    if assignments.is_empty() {
+        Settings::new(desc, overrides)
+    } else {
+        Settings::new(&changed(desc, assignments)?, overrides)
     }
 }
 
 /// The settings of a scene with these changes; it holds neither shapes nor lights.
-pub fn changed(desc: &SceneDesc, assignments: &[Assignment]) -> Result<SceneDesc> {
+fn changed(desc: &SceneDesc, assignments: &[Assignment]) -> Result<SceneDesc> {
     let mut parts = json!({ "camera": {}, "film": desc.film, "sampler": desc.sampler, "integrator": desc.integrator });
     for Assignment { key, value } in assignments {
-        set(&mut parts, key, value.clone());
-        check(&parts).map_err(|message| Error::Usage(format!("--set {key}={value}: {message}")))?;
+        assign(&mut parts, &key.split('.').collect::<Vec<_>>(), value.clone());
+        check(&parts).map_err(|message| refused("set", format!(" {key}={value}: {message}")))?;
     }
     let SceneDesc { film, sampler, integrator, .. } = read(&parts)?;
     Ok(SceneDesc {
@@ -50,21 +80,30 @@ pub fn changed(desc: &SceneDesc, assignments: &[Assignment]) -> Result<SceneDesc
     })
 }
 
-/// Another type has other keys: those of the one before do not remain.
-fn set(parts: &mut Value, key: &str, value: Value) {
-    let (outer, last) = key.rsplit_once('.').unwrap_or(("", key));
-    let mut node = parts;
-    for key in outer.split('.') {
-        node = &mut node[key];
+/// Sets the value at the end of these keys. Another type has other keys: those of the one before do not remain.
+pub(super) fn assign(value: &mut Value, keys: &[&str], new: Value) {
+    let Some((last, outer)) = keys.split_last() else { return };
+    let mut node = value;
+    for key in outer {
+        node = match key.parse::<usize>() {
+            Ok(i) if node.get(i).is_some() => &mut node[i],
+            _ => &mut node[*key],
+        };
     }
-    if !node.is_object() || last == "type" && node.get(last) != Some(&value) {
+    if let Ok(i) = last.parse::<usize>()
+        && node.get(i).is_some()
+    {
+        node[i] = new;
+        return;
+    }
+    if !node.is_object() || *last == "type" && node.get(*last) != Some(&new) {
         *node = Value::Object(Map::new());
     }
-    node[last] = value;
+    node[*last] = new;
 }
 
 fn read(parts: &Value) -> Result<SceneDesc> {
-    import::parse_scene(&parts.to_string(), Path::new("--set"))
+    parse_scene(&parts.to_string(), Path::new("set"))
 }
 
 /// What is wrong with the settings.
@@ -77,7 +116,7 @@ fn check(parts: &Value) -> Result<(), String> {
     if desc.sampler.spp == 0 {
         return Err("a picture needs at least one sample per pixel".to_owned());
     }
-    compile::check_film_and_integrator(&desc.film, &desc.integrator, Path::new("--set")).map_err(message)
+    check_film_and_integrator(&desc.film, &desc.integrator, Path::new("set")).map_err(message)
 }
 
 #[cfg(test)]
@@ -102,9 +141,9 @@ mod tests {
     #[test]
     fn faults_name_the_assignment() {
         for (text, parts) in [
-            ("integrator.clmap=10", &["--set integrator.clmap=10", "did you mean \"clamp\"?"][..]),
-            ("integrator.clamp=-1", &["--set integrator.clamp=-1", "above 0"]),
-            ("sampler.spp=many", &["--set sampler.spp=\"many\"", "expected a whole number"]),
+            ("integrator.clmap=10", &["`set` integrator.clmap=10", "did you mean \"clamp\"?"][..]),
+            ("integrator.clamp=-1", &["`set` integrator.clamp=-1", "above 0"]),
+            ("sampler.spp=many", &["`set` sampler.spp=\"many\"", "expected a whole number"]),
             ("sampler.spp=0", &["at least one sample"]),
             ("camera.near=1", &["keys begin with film., sampler. or integrator."]),
             ("integrator", &["expected KEY=VALUE"]),
