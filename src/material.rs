@@ -7,8 +7,8 @@ pub use inputs::{AlphaInput, CoatInput, ColorInput, Facets, PlasticCoat, RangedI
 pub use principled::PrincipledInputs;
 
 use crate::bsdf::{
-    Beckmann, Bsdf, BsdfFlags, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Phong,
-    Plastic, Principled, SeparableGgx, SingleScatteringBsdf, ThinDielectric,
+    Beckmann, Bsdf, BsdfFlags, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Hair, Lambert, Mirror, Phong,
+    Plastic, Principled, SeparableGgx, SingleScatteringBsdf, ThinDielectric, hair_absorption_of_color,
 };
 use crate::color::Rgb;
 use crate::id::{MaterialId, TextureId};
@@ -137,6 +137,26 @@ pub enum TexturedMaterial {
     },
     /// The principled model.
     Principled(PrincipledInputs),
+    /// Hair.
+    Hair {
+        /// What it absorbs.
+        color: HairColor,
+        /// Index of refraction over that of the outside.
+        ior: f32,
+        /// Roughness along and around it.
+        roughness: [f32; 2],
+        /// The tilt of its scales in radians.
+        tilt: f32,
+    },
+}
+
+/// What hair absorbs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum HairColor {
+    /// Absorption per radius.
+    Absorption(Rgb),
+    /// The colour that many strands have together.
+    Reflectance(ColorInput),
 }
 
 impl Facets {
@@ -238,6 +258,15 @@ impl TexturedMaterial {
                 Bsdf::coated(coat.at(textures, footprint), tint.at(textures, footprint), base)
             }
             Self::Principled(inputs) => Bsdf::Principled(Principled::new(&inputs.parameters(textures, footprint))),
+            Self::Hair { color, ior, roughness, tilt } => {
+                let sigma_a = match color {
+                    HairColor::Absorption(sigma_a) => *sigma_a,
+                    HairColor::Reflectance(color) => {
+                        hair_absorption_of_color(color.at(textures, footprint), roughness[1])
+                    }
+                };
+                Bsdf::Hair(Hair::new(sigma_a, *ior, *roughness, *tilt))
+            }
         }
     }
 
@@ -290,6 +319,8 @@ impl TexturedMaterial {
                 found.extend(base.textures());
             }
             Self::Principled(inputs) => found = inputs.textures(),
+            Self::Hair { color: HairColor::Reflectance(color), .. } => found.extend(color.texture()),
+            Self::Hair { .. } => {}
         }
         found
     }
@@ -309,6 +340,7 @@ impl TexturedMaterial {
             Self::Plastic { coat, .. } => coat.flags() | F::DIFFUSE,
             Self::Coated { coat, base, .. } => coat.flags() | base.flags(),
             Self::Principled(inputs) => inputs.flags(),
+            Self::Hair { .. } => F::GLOSSY | both_sides | F::ANISOTROPIC | F::FIBER,
         }
     }
 }

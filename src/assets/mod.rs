@@ -14,6 +14,7 @@ mod obj_check;
 mod ply;
 mod ply_attributes;
 mod source;
+mod strands;
 
 pub use environment_image::{RgbImage, read_rgb_image};
 pub(crate) use fingerprint::{Hash, file_hashes, files_of_obj, is_obj};
@@ -25,6 +26,7 @@ pub use mtl_maps::{ObjMap, ObjMaps};
 pub use obj::{ObjMaterial, ObjMesh, read_obj};
 pub use ply::{read_ply, read_ply_attributes};
 pub use source::SceneSource;
+pub use strands::{StrandData, read_strands};
 
 use std::path::{Path, PathBuf};
 

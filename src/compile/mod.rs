@@ -6,7 +6,9 @@ mod camera;
 mod check;
 mod coincident;
 mod composites;
+mod curves;
 mod faults;
+mod hair;
 mod identities;
 mod keyframes;
 mod lights;
@@ -256,7 +258,11 @@ impl Builder {
             analytic_shapes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Analytic(_))),
             instances: !self.geometry.instances.is_empty(),
             textures: materials.iter().any(Material::is_textured),
-            attributes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Mesh(mesh) if mesh.has_attributes())),
+            attributes: self.geometry.shapes.iter().any(|s| match s {
+                Shape::Mesh(mesh) => mesh.has_attributes(),
+                Shape::Curves(curves) => curves.has_attributes(),
+                Shape::Analytic(_) | Shape::Points(_) => false,
+            }),
             filtered_textures: materials.iter().any(Material::is_textured)
                 && self.materials.textures.textures.iter().any(Texture::is_filtered),
             image_textures: self.materials.textures.textures.iter().any(Texture::has_image),

@@ -7,6 +7,7 @@ use std::rc::Rc;
 use super::area_light::AreaLight;
 use super::camera::{self, CameraDirective};
 use super::colors::{ColorSpace, Colors};
+use super::curves::joined;
 use super::lights::Lights;
 use super::materials::Materials;
 use super::media::{MediumInterface, MediumTable};
@@ -476,7 +477,13 @@ impl Reader {
             Directive { kind: &kind, params: &params },
             &self.graphics,
         )?;
-        let Some(shape) = read else { return Ok(()) };
+        let Some(mut shape) = read else { return Ok(()) };
+        let object = self.object.as_mut();
+        let shapes =
+            object.map_or(self.draft.desc.shapes.last_mut(), |object| object.shapes.last_mut().map(|s| &mut s.1));
+        if joined(shapes, &mut shape) {
+            return Ok(());
+        }
         match &mut self.object {
             Some(object) => object.shapes.push((params.place, shape)),
             None => self.draft.add_shape(&params.place, shape),
