@@ -48,15 +48,15 @@ fn samples_have_the_value_and_density_of_their_direction() {
 
 /// The mean of the value over the sphere by uniform directions, with its standard deviation.
 fn scattered(hair: &Hair, wo: Vec3, seed: u32) -> [f64; 2] {
-    const COUNT: usize = 200_000;
+    const COUNT: u32 = 200_000;
     let (mut sum, mut squares) = (0.0, 0.0);
     for u in random_points(seed, COUNT) {
         let value = 4.0 * std::f64::consts::PI * f64::from(hair.eval(wo, direction(1.0 - 2.0 * u[0], u[1])).value.g);
         sum += value;
         squares += value * value;
     }
-    let mean = sum / COUNT as f64;
-    [mean, ((squares / COUNT as f64 - mean * mean) / COUNT as f64).sqrt()]
+    let mean = sum / f64::from(COUNT);
+    [mean, ((squares / f64::from(COUNT) - mean * mean) / f64::from(COUNT)).sqrt()]
 }
 
 #[test]

@@ -84,3 +84,10 @@ pub fn joined(before: Option<&mut ShapeDesc>, shape: &mut ShapeDesc) -> bool {
     }
     alike
 }
+
+/// Adds a shape to those of an object.
+pub fn push(shapes: &mut Vec<(String, ShapeDesc)>, place: String, mut shape: ShapeDesc) {
+    if !joined(shapes.last_mut().map(|(_, last)| last), &mut shape) {
+        shapes.push((place, shape));
+    }
+}

@@ -7,7 +7,7 @@ use std::rc::Rc;
 use super::area_light::AreaLight;
 use super::camera::{self, CameraDirective};
 use super::colors::{ColorSpace, Colors};
-use super::curves::joined;
+use super::curves::{joined, push};
 use super::lights::Lights;
 use super::materials::Materials;
 use super::media::{MediumInterface, MediumTable};
@@ -478,14 +478,9 @@ impl Reader {
             &self.graphics,
         )?;
         let Some(mut shape) = read else { return Ok(()) };
-        let object = self.object.as_mut();
-        let shapes =
-            object.map_or(self.draft.desc.shapes.last_mut(), |object| object.shapes.last_mut().map(|s| &mut s.1));
-        if joined(shapes, &mut shape) {
-            return Ok(());
-        }
         match &mut self.object {
-            Some(object) => object.shapes.push((params.place, shape)),
+            Some(object) => push(&mut object.shapes, params.place, shape),
+            None if joined(self.draft.desc.shapes.last_mut(), &mut shape) => {}
             None => self.draft.add_shape(&params.place, shape),
         }
         Ok(())
