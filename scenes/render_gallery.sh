@@ -30,6 +30,7 @@ nee             nee             208x156  8s
 nee_by_chance   nee             208x156  8s    --strategy bsdf
 nee_only        nee             208x156  8s    --strategy light
 fog             fog             256x168  192
+fur             fur             288x180  256
 glossy          glossy          270x180  2048
 principled      principled      176x264  1024
 textures        textures        288x144  1024

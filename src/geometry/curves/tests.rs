@@ -45,7 +45,7 @@ fn a_straight_curve_is_a_cylinder() {
         let [a, b] = [a, b].map(|p| p.as_vec3());
         let points = [a, b].map(|p: Vec3| [p.x, p.y, p.z, radius]);
         let line = curves(&points, CurveBasis::Linear, CurveKind::Round);
-        let axis = (b - a).as_dvec3();
+        let axis = b.as_dvec3() - a.as_dvec3();
         let z = axis.normalize();
         let x = z.any_orthonormal_vector();
         let frame = crate::math::DAffine3::from_mat3_translation(DMat3::from_cols(x, z.cross(x), z), a.as_dvec3());
@@ -160,7 +160,7 @@ fn curves_are_met_where_brute_force_meets_them() {
             }
         }
     }
-    assert!(hits > 200 && misses > 50, "{hits} {misses}");
+    assert!(hits > 100 && misses > 200, "{hits} {misses}");
 }
 
 #[test]
