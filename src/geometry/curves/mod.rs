@@ -13,7 +13,7 @@ use crate::attribute::Attribute;
 use crate::id::PrimId;
 use crate::math::float::EMBREE_LARGE;
 use crate::math::{Aabb, Bounds, DVec4, Ray};
-use segment::{Pick, RaySpace, Segment, SegmentHit, joint_hit};
+use segment::{Capsule, Pick, RaySpace, Segment, SegmentHit, joint_hit};
 
 /// How control points make a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,6 +74,8 @@ pub struct Curves {
     /// What textures take: values for each strand (as those of faces) or for each control point.
     attributes: Box<[Attribute]>,
     bounds: Aabb,
+    /// Of each segment.
+    capsules: Vec<Capsule>,
 }
 
 impl Curves {
@@ -111,7 +113,9 @@ impl Curves {
             root_uvs: None,
             attributes: Box::default(),
             bounds: Aabb::EMPTY,
+            capsules: Vec::new(),
         };
+        curves.capsules = (0..curves.prim_count()).map(|i| Capsule::new(&curves.segment(PrimId::new(i)))).collect();
         curves.bounds =
             (0..curves.prim_count()).fold(Aabb::EMPTY, |all, i| all.union(&curves.prim_bounds(PrimId::new(i))));
         Ok(curves)
@@ -181,16 +185,17 @@ impl Curves {
         size_of_val(self.points.as_slice())
             + size_of_val(self.segments.as_slice())
             + size_of_val(self.strands.as_slice())
+            + size_of_val(self.capsules.as_slice())
             + self.root_uvs.as_ref().map_or(0, |uvs| size_of_val(uvs.as_slice()))
             + attributes
     }
 
     /// The distance of the first hit of a ray with a segment, within the ray's interval.
     pub fn intersect(&self, prim: PrimId, ray: &Ray) -> Option<f32> {
-        let segment = self.segment(prim);
-        if !segment.may_meet(ray) {
+        if !self.capsules[prim.index()].may_be_met(ray) {
             return None;
         }
+        let segment = self.segment(prim);
         let space = RaySpace::new(ray);
         let [min, max] = [ray.t_min, ray.t_max].map(|t| f64::from(t) * space.length);
         // Rounding keeps the order, but the product with the length may have moved the ends.

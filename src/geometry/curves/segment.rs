@@ -6,7 +6,8 @@
 //! found by intersecting the tangent cone again and again, as in Reshetov and Luebke, "Phantom Ray-Hair Intersector". A
 //! flat curve is met where the ray passes it within its radius.
 
-use crate::math::{DVec3, DVec4, Ray};
+use crate::math::float::{UNIT_ROUNDOFF, round_up};
+use crate::math::{DVec3, DVec4, Ray, Vec3};
 
 /// The curve's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -134,17 +135,6 @@ impl Segment {
         [Self([a, ab, abc, middle]), Self([middle, bcd, cd, d])]
     }
 
-    /// Whether the line of a ray passes so close to that of the chord that it may meet the segment. Most rays that
-    /// meet the bounds of a segment pass it by, and this needs no root of the ray's own.
-    pub fn may_meet(&self, ray: &Ray) -> bool {
-        let (first, last) = (self.0[0].truncate(), self.0[3].truncate());
-        let (direction, chord, from) = (ray.direction.as_dvec3(), last - first, first - ray.origin.as_dvec3());
-        let normal = direction.cross(chord);
-        let rounding = 1e-14 * from.length() * direction.length() * chord.length();
-        let reach = (self.max_radius() + self.deviation()) * normal.length();
-        from.dot(normal).abs() <= reach + rounding
-    }
-
     /// The segment in a ray's space.
     pub fn in_space(&self, space: &RaySpace) -> Self {
         Self(self.0.map(|p| space.point(p)))
@@ -155,6 +145,39 @@ impl Segment {
         let mut search = Search { kind, pick, best: None };
         search.halve(self, 0.0, MAX_DEPTH);
         search.best
+    }
+}
+
+/// The line of a segment's chord, and a bound of the distance of the surface from it, in `f32`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Capsule {
+    first: Vec3,
+    chord: Vec3,
+    reach: f32,
+}
+
+impl Capsule {
+    pub fn new(segment: &Segment) -> Self {
+        let (first, last) = (segment.0[0].truncate(), segment.0[3].truncate());
+        let rounding = 4.0 * UNIT_ROUNDOFF * first.abs().max(last.abs()).max_element();
+        Self {
+            first: first.as_vec3(),
+            chord: (last - first).as_vec3(),
+            reach: round_up(segment.max_radius() + segment.deviation() + rounding),
+        }
+    }
+
+    /// Whether the line of a ray passes so close to that of the chord that it may meet the segment. Most rays that
+    /// meet the bounds of a segment pass it by. What is too large for `f32` passes.
+    #[inline(always)]
+    pub fn may_be_met(&self, ray: &Ray) -> bool {
+        let from = self.first - ray.origin;
+        let normal = ray.direction.cross(self.chord);
+        // The roundings of the products: some 16 of each term.
+        let terms = (from.length_squared() * ray.direction.length_squared() * self.chord.length_squared()).sqrt();
+        let reach = self.reach * normal.length() * 1.000_001 + 2e-6 * terms;
+        let passes_by = from.dot(normal).abs() > reach;
+        !passes_by
     }
 }
 
