@@ -159,6 +159,16 @@ pub enum HairColor {
     Reflectance(ColorInput),
 }
 
+impl HairColor {
+    /// The absorption per radius, for a roughness around the hair.
+    fn absorption(self, azimuthal: f32, textures: &[Texture], footprint: &Footprint) -> Rgb {
+        match self {
+            Self::Absorption(sigma_a) => sigma_a,
+            Self::Reflectance(color) => hair_absorption_of_color(color.at(textures, footprint), azimuthal),
+        }
+    }
+}
+
 impl Facets {
     #[inline(always)]
     fn conductor(self, metal: &Conductor, alpha: [f32; 2], tint: Rgb) -> Bsdf {
@@ -243,11 +253,8 @@ impl TexturedMaterial {
             }
             Self::ThinDielectric { ior, tints } => {
                 let [reflection_tint, transmission_tint] = tints.map(|tint| tint.at(textures, footprint));
-                Bsdf::ThinDielectric(ThinDielectric {
-                    ior: ior.at(textures, footprint),
-                    reflection_tint,
-                    transmission_tint,
-                })
+                let ior = ior.at(textures, footprint);
+                Bsdf::ThinDielectric(ThinDielectric { ior, reflection_tint, transmission_tint })
             }
             Self::Plastic { coat, albedo, tint, nonlinear } => {
                 let (albedo, tint) = (albedo.at(textures, footprint), tint.at(textures, footprint));
@@ -259,13 +266,7 @@ impl TexturedMaterial {
             }
             Self::Principled(inputs) => Bsdf::Principled(Principled::new(&inputs.parameters(textures, footprint))),
             Self::Hair { color, ior, roughness, tilt } => {
-                let sigma_a = match color {
-                    HairColor::Absorption(sigma_a) => *sigma_a,
-                    HairColor::Reflectance(color) => {
-                        hair_absorption_of_color(color.at(textures, footprint), roughness[1])
-                    }
-                };
-                Bsdf::Hair(Hair::new(sigma_a, *ior, *roughness, *tilt))
+                Bsdf::Hair(Hair::new(color.absorption(roughness[1], textures, footprint), *ior, *roughness, *tilt))
             }
         }
     }

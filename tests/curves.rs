@@ -131,7 +131,9 @@ fn strands_have_colours() {
                 "integrator": { "type": "path", "max_depth": 2 },
                 "textures": { "colors": { "type": "vertex_color" } },
                 "materials": { "dyed": { "type": "diffuse", "albedo": { "texture": "colors" } } },
-                "shapes": [{ "type": "curves", "basis": "linear", "material": "dyed", "strands": strands, "colors": colors }],
+                "shapes": [{
+                    "type": "curves", "basis": "linear", "material": "dyed", "strands": strands, "colors": colors
+                }],
                 "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
             }),
         );

@@ -258,11 +258,7 @@ impl Builder {
             analytic_shapes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Analytic(_))),
             instances: !self.geometry.instances.is_empty(),
             textures: materials.iter().any(Material::is_textured),
-            attributes: self.geometry.shapes.iter().any(|s| match s {
-                Shape::Mesh(mesh) => mesh.has_attributes(),
-                Shape::Curves(curves) => curves.has_attributes(),
-                Shape::Analytic(_) | Shape::Points(_) => false,
-            }),
+            attributes: self.geometry.shapes.iter().any(Shape::has_attributes),
             filtered_textures: materials.iter().any(Material::is_textured)
                 && self.materials.textures.textures.iter().any(Texture::is_filtered),
             image_textures: self.materials.textures.textures.iter().any(Texture::has_image),

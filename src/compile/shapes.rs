@@ -5,7 +5,8 @@ use crate::desc::{ProfileDesc, ProfileParameterDesc, ShapeDesc};
 use crate::error::Result;
 use crate::geometry::{Analytic, Disk, Frustum, Profile, ProfileParameter, Quad, Revolution, ShapeError, Sphere};
 
-/// The analytic surface of a shape; `None` for meshes, cubes, curves, points, and planes (whose extent depends on the scene).
+/// The analytic surface of a shape; `None` for meshes, cubes, curves, points, and planes (whose extent depends on the
+/// scene).
 pub fn compile(files: &CompileContext, path: &str, desc: &ShapeDesc) -> Result<Option<Analytic>> {
     let surface = match desc {
         ShapeDesc::Mesh(_) | ShapeDesc::Cube(_) | ShapeDesc::Plane(_) | ShapeDesc::Curves(_) | ShapeDesc::Points(_) => {

@@ -95,6 +95,15 @@ impl Shape {
         }
     }
 
+    /// Whether textures can take attributes of it.
+    pub fn has_attributes(&self) -> bool {
+        match self {
+            Self::Mesh(mesh) => mesh.has_attributes(),
+            Self::Curves(curves) => curves.has_attributes(),
+            Self::Analytic(_) | Self::Points(_) => false,
+        }
+    }
+
     /// Bounds of the whole shape.
     pub fn bounds(&self) -> Aabb {
         match self {

@@ -158,16 +158,20 @@ pub fn scenes() -> Vec<(&'static str, Geometry)> {
         }))
     };
     scenes.push(("overlapping", world(vec![twice(), twice()])));
-    let strands = [
+    scenes.push(("curves", world(curves_of_all_kinds(&mut rng))));
+    scenes.push(("points", world(vec![points(&mut rng, 300), Shape::Mesh(soup(&mut rng, 50, 0.3))])));
+    scenes
+}
+
+/// Strands of every basis and kind.
+fn curves_of_all_kinds(rng: &mut Rng) -> Vec<Shape> {
+    let all = [
         (CurveBasis::BSpline, CurveKind::Round),
         (CurveBasis::Linear, CurveKind::Round),
         (CurveBasis::Bezier, CurveKind::Flat),
         (CurveBasis::CatmullRom, CurveKind::Cylinder),
     ];
-    let strands: Vec<Shape> = strands.iter().map(|&(basis, kind)| curves(&mut rng, 40, basis, kind)).collect();
-    scenes.push(("curves", world(strands.clone())));
-    scenes.push(("points", world(vec![points(&mut rng, 300), Shape::Mesh(soup(&mut rng, 50, 0.3))])));
-    scenes
+    all.iter().map(|&(basis, kind)| curves(rng, 40, basis, kind)).collect()
 }
 
 /// Strands of seven control points each.

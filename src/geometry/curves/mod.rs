@@ -229,7 +229,11 @@ impl Curves {
     /// A segment as a Bezier curve.
     fn segment(&self, prim: PrimId) -> Segment {
         let first = self.segments[prim.index()] as usize;
-        let point = |i: usize| DVec4::from(self.points[first + i].map(f64::from));
+        let point = |i: usize| {
+            // Not by `map`, which is a call.
+            let [x, y, z, radius] = self.points[first + i];
+            DVec4::new(f64::from(x), f64::from(y), f64::from(z), f64::from(radius))
+        };
         let positive = |p: DVec4| DVec4::new(p.x, p.y, p.z, p.w.max(0.0));
         Segment(match self.basis {
             CurveBasis::Linear => {

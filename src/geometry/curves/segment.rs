@@ -120,6 +120,7 @@ impl Segment {
     }
 
     /// The point and its derivative.
+    #[inline]
     pub fn at(&self, u: f64) -> [DVec4; 2] {
         let [a, b, c, d] = self.0;
         let (ab, bc, cd) = (a.lerp(b, u), b.lerp(c, u), c.lerp(d, u));
@@ -137,7 +138,9 @@ impl Segment {
 
     /// The segment in a ray's space.
     pub fn in_space(&self, space: &RaySpace) -> Self {
-        Self(self.0.map(|p| space.point(p)))
+        // Not by `map`, which is a call.
+        let [a, b, c, d] = self.0;
+        Self([space.point(a), space.point(b), space.point(c), space.point(d)])
     }
 
     /// Where a ray meets the segment, given in the ray's space.

@@ -1,12 +1,11 @@
 //! Makes meshes of `scenes/` (a knot of 72,000 triangles and a coarse one of 1,920, a terrain of 131,072, a vase of
-//! 320, plants, an island, the beams of a gate), fur and grass, a sky, and the scene `shrine.json`, in which more than a thousand of
+//! 320, plants, an island, the beams of a gate), a sky, and the scene `shrine.json`, in which more than a thousand of
 //! the plants stand.
 //!
 //! `cargo xtask make_meshes` overwrites them, byte for byte the same.
 
 mod plants;
 mod shrine;
-mod strands;
 
 use std::error::Error;
 use std::f32::consts::{PI, TAU};
@@ -37,8 +36,6 @@ pub fn run() -> Outcome {
         ply(&Mesh { normals: Vec::new(), ..grid(72, 72, false, shrine::island) }),
     )?;
     fs::write(scenes.join("meshes/gate_beam.ply"), ply(&shrine::beam()))?;
-    fs::write(scenes.join("meshes/fur.strands"), strands::fur())?;
-    fs::write(scenes.join("meshes/tuft.strands"), strands::tuft())?;
     fs::write(scenes.join("shrine.json"), shrine::scene())?;
     write_sky(&scenes.join("textures/sky.exr"))?;
     Ok(())

@@ -60,6 +60,12 @@ enum Form {
     Curves(CurvesDesc),
 }
 
+/// Reports that curves emit no light; false.
+fn no_light(draft: &mut Draft, params: &Params) -> bool {
+    draft.ignored(&params.place, &params.element, "AreaLightSource", "curves emit no light");
+    false
+}
+
 /// The transforms of a shape; what emits light does not move.
 fn still_if_lit(draft: &mut Draft, params: &Params, mut ctm: Ctm, is_light: bool) -> Ctm {
     if is_light && ctm.is_moving() {
@@ -139,10 +145,7 @@ impl Shapes<'_> {
             }
             Form::File(file) => (ShapeDesc::Mesh(MeshDesc::from_file(file)), DAffine3::IDENTITY, None),
             Form::Curves(curves) => {
-                reverse = false;
-                if light.take().is_some() {
-                    draft.ignored(&params.place, &params.element, "AreaLightSource", "curves emit no light");
-                }
+                (reverse, light) = (false, light.filter(|_| no_light(draft, params)));
                 (ShapeDesc::Curves(curves), DAffine3::IDENTITY, None)
             }
         };
