@@ -63,8 +63,7 @@ impl AlphaMasks {
 }
 
 /// Distinguishes the hits of a ray with one primitive that is no triangle, which have the same ids: it enters and
-/// leaves from
-/// different sides. Distances would not do, for accelerators round them differently.
+/// leaves from different sides. Distances would not do, for accelerators round them differently.
 fn side(shape: &Shape, ray: &Ray, hit: &Hit) -> u32 {
     match shape {
         Shape::Mesh(_) => 0,

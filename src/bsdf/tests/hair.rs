@@ -103,8 +103,7 @@ fn no_parameters_scatter_more_than_all_light_or_make_no_number() {
 
 #[test]
 fn what_is_reflected_at_the_surface_is_reciprocal() {
-    // Without tilt, of a hair so black that nothing leaves it again: seen from another side, light that crosses it meets
-    // it elsewhere across its width.
+    // Without tilt, of a hair so black that nothing leaves it again: what crosses it is not reciprocal.
     let hair = Hair::new(Rgb::splat(1e6), 1.55, [0.3, 0.3], 0.0);
     for along in [-0.5f32, 0.0, 0.4] {
         for h in [0.0f32, 0.3, -0.7] {

@@ -33,7 +33,7 @@ impl CurveBasis {
     pub fn segments(self, points: usize) -> Option<usize> {
         match self {
             Self::Linear => points.checked_sub(1),
-            Self::Bezier => points.checked_sub(1).filter(|rest| rest % 3 == 0).map(|rest| rest / 3),
+            Self::Bezier => points.checked_sub(1).filter(|rest| rest.is_multiple_of(3)).map(|rest| rest / 3),
             Self::BSpline | Self::CatmullRom => points.checked_sub(3),
         }
         .filter(|&segments| segments > 0)

@@ -42,7 +42,7 @@ fn a_straight_curve_is_a_cylinder() {
     for _ in 0..40 {
         let (a, b) = (rng.cube(), rng.cube());
         let radius = 10f64.powf(rng.range(-4.0, -1.0)) as f32;
-        let [a, b] = [a, b].map(|p| p.as_vec3());
+        let [a, b] = [a, b].map(DVec3::as_vec3);
         let points = [a, b].map(|p: Vec3| [p.x, p.y, p.z, radius]);
         let line = curves(&points, CurveBasis::Linear, CurveKind::Round);
         let axis = b.as_dvec3() - a.as_dvec3();

@@ -51,7 +51,7 @@ pub fn curve(params: &Params) -> Result<CurvesDesc> {
 
 /// The joined Bezier curves of a degree.
 fn beziers<'p>(params: &Params, points: &'p [DVec3], degree: usize) -> Result<impl Iterator<Item = &'p [DVec3]>> {
-    if points.len() <= degree || (points.len() - 1) % degree != 0 {
+    if points.len() <= degree || !(points.len() - 1).is_multiple_of(degree) {
         return Err(params.error(format!(
             "{} control points: Bezier curves of degree {degree} need a multiple of {degree} and one more",
             points.len()
