@@ -173,7 +173,7 @@ fn files_of_strands_and_points_are_read() {
     set(&mut scene, "shapes[0].file", json!("bad.txt"));
     assert_error(&folder, &scene, ErrorKind::Scene, &["shapes[0].file", "bad.txt", "line 2"]);
     set(&mut scene, "shapes[0].file", json!("none.txt"));
-    assert_error(&folder, &scene, ErrorKind::Missing, &["shapes[0].file", "none.txt"]);
+    assert_error(&folder, &scene, ErrorKind::AssetMissing, &["shapes[0].file", "none.txt"]);
 }
 
 #[test]
