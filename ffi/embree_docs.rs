@@ -414,6 +414,35 @@ impl Default for StEnteredInstance {
         }
     }
 }
+pub type StIntersectPrimitive = ::std::option::Option<
+    unsafe extern "C" fn(
+        shape: *const ::std::os::raw::c_void,
+        prim: u32,
+        ray: *const StRay,
+        key: u32,
+        instance: u32,
+    ) -> f32,
+>;
+pub type StPrimitiveBounds = ::std::option::Option<
+    unsafe extern "C" fn(shape: *const ::std::os::raw::c_void, prim: u32, lower: *mut f32, upper: *mut f32),
+>;
+#[repr(C)]
+#[derive(Debug, Copy, Clone)]
+pub struct StUserPrimitives {
+    pub shape: *const ::std::os::raw::c_void,
+    pub count: u32,
+    pub intersect: StIntersectPrimitive,
+    pub bounds: StPrimitiveBounds,
+}
+impl Default for StUserPrimitives {
+    fn default() -> Self {
+        let mut s = ::std::mem::MaybeUninit::<Self>::uninit();
+        unsafe {
+            ::std::ptr::write_bytes(s.as_mut_ptr(), 0, 1);
+            s.assume_init()
+        }
+    }
+}
 #[repr(C)]
 #[derive(Debug, Copy, Clone)]
 pub struct StFilter {
@@ -490,6 +519,7 @@ unsafe extern "C" {
     pub fn rtcGetSceneBounds(scene: RTCScene, bounds_o: *mut RTCBounds);
     pub fn st_new_entered_instance(device: RTCDevice, instance: *const StEnteredInstance) -> RTCGeometry;
     pub fn st_new_user_geometry(device: RTCDevice, shape: *const StUserShape) -> RTCGeometry;
+    pub fn st_new_user_primitives(device: RTCDevice, primitives: *const StUserPrimitives) -> RTCGeometry;
     pub fn st_set_filter(triangles: RTCGeometry, filter_data: *const StFilter);
     pub fn st_intersect1(scene: RTCScene, query: *mut StQuery, rayhit: *mut RTCRayHit);
     pub fn st_occluded1(scene: RTCScene, query: *mut StQuery, ray: *mut RTCRay);

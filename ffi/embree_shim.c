@@ -66,13 +66,12 @@ static void intersect_lanes(const struct StUserShape *shape, const float *rays, 
     }
 }
 
-static void user_intersect(const struct RTCIntersectFunctionNArguments *args) {
+/* Sets the hits of the valid lanes whose distance is not negative. */
+static void set_hits(const struct RTCIntersectFunctionNArguments *args, const float *t) {
     const unsigned n = args->N;
     float *rays = (float *)args->rayhit;
     float *reals = rays + HIT * n;
     unsigned *ids = (unsigned *)reals;
-    float t[16];
-    intersect_lanes(args->geometryUserPtr, rays, n, args->valid, args->context->instID[0], t);
     for (unsigned lane = 0; lane < n; lane++) {
         if (args->valid[lane] != -1 || !(t[lane] >= 0.0f)) continue;
         rays[TFAR * n + lane] = t[lane];
@@ -87,22 +86,69 @@ static void user_intersect(const struct RTCIntersectFunctionNArguments *args) {
     }
 }
 
-static void user_occluded(const struct RTCOccludedFunctionNArguments *args) {
+/* Marks the valid lanes whose distance is not negative as occluded. */
+static void set_occluded(const struct RTCOccludedFunctionNArguments *args, const float *t) {
     const unsigned n = args->N;
     float *rays = (float *)args->ray;
-    float t[16];
-    intersect_lanes(args->geometryUserPtr, rays, n, args->valid, args->context->instID[0], t);
     for (unsigned lane = 0; lane < n; lane++) {
         if (args->valid[lane] == -1 && t[lane] >= 0.0f) rays[TFAR * n + lane] = -INFINITY;
     }
 }
 
+static void user_intersect(const struct RTCIntersectFunctionNArguments *args) {
+    float t[16];
+    intersect_lanes(args->geometryUserPtr, (const float *)args->rayhit, args->N, args->valid, args->context->instID[0], t);
+    set_hits(args, t);
+}
+
+static void user_occluded(const struct RTCOccludedFunctionNArguments *args) {
+    float t[16];
+    intersect_lanes(args->geometryUserPtr, (const float *)args->ray, args->N, args->valid, args->context->instID[0], t);
+    set_occluded(args, t);
+}
+
+/* Of rays and a primitive. */
+struct Lanes {
+    const struct StUserPrimitives *primitives;
+    unsigned prim, n, instance;
+};
+
+static void intersect_primitive(struct Lanes lanes, const float *rays, const int *valid, float *t) {
+    const struct StUserPrimitives *primitives = lanes.primitives;
+    for (unsigned lane = 0; lane < lanes.n; lane++) {
+        if (valid[lane] != -1) continue;
+        const struct StRay ray = ray_of_lane(rays, lanes.n, lane);
+        t[lane] = primitives->intersect(primitives->shape, lanes.prim, &ray, key_of_lane(rays, lanes.n, lane), lanes.instance);
+    }
+}
+
+static void primitive_intersect(const struct RTCIntersectFunctionNArguments *args) {
+    float t[16];
+    const struct Lanes lanes = {args->geometryUserPtr, args->primID, args->N, args->context->instID[0]};
+    intersect_primitive(lanes, (const float *)args->rayhit, args->valid, t);
+    set_hits(args, t);
+}
+
+static void primitive_occluded(const struct RTCOccludedFunctionNArguments *args) {
+    float t[16];
+    const struct Lanes lanes = {args->geometryUserPtr, args->primID, args->N, args->context->instID[0]};
+    intersect_primitive(lanes, (const float *)args->ray, args->valid, t);
+    set_occluded(args, t);
+}
+
+static void primitive_bounds(const struct RTCBoundsFunctionArguments *args) {
+    const struct StUserPrimitives *primitives = args->geometryUserPtr;
+    float lower[3], upper[3];
+    primitives->bounds(primitives->shape, args->primID, lower, upper);
+    set_bounds(args->bounds_o, lower, upper);
+}
+
 static RTCGeometry new_user_geometry(
-    RTCDevice device, const void *user, RTCBoundsFunction bounds, RTCIntersectFunctionN intersect, RTCOccludedFunctionN occluded
+    RTCDevice device, const void *user, uint32_t count, RTCBoundsFunction bounds, RTCIntersectFunctionN intersect, RTCOccludedFunctionN occluded
 ) {
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
     if (!geometry) return NULL;
-    rtcSetGeometryUserPrimitiveCount(geometry, 1);
+    rtcSetGeometryUserPrimitiveCount(geometry, count);
     rtcSetGeometryUserData(geometry, (void *)user);
     rtcSetGeometryBoundsFunction(geometry, bounds, NULL);
     rtcSetGeometryIntersectFunction(geometry, intersect);
@@ -112,7 +158,11 @@ static RTCGeometry new_user_geometry(
 }
 
 RTCGeometry st_new_user_geometry(RTCDevice device, const struct StUserShape *shape) {
-    return new_user_geometry(device, shape, user_bounds, user_intersect, user_occluded);
+    return new_user_geometry(device, shape, 1, user_bounds, user_intersect, user_occluded);
+}
+
+RTCGeometry st_new_user_primitives(RTCDevice device, const struct StUserPrimitives *primitives) {
+    return new_user_geometry(device, primitives, primitives->count, primitive_bounds, primitive_intersect, primitive_occluded);
 }
 
 static void filter(const struct RTCFilterFunctionNArguments *args) {
@@ -207,7 +257,7 @@ static void entered_occluded(const struct RTCOccludedFunctionNArguments *args) {
 }
 
 RTCGeometry st_new_entered_instance(RTCDevice device, const struct StEnteredInstance *instance) {
-    return new_user_geometry(device, instance, entered_bounds, entered_intersect, entered_occluded);
+    return new_user_geometry(device, instance, 1, entered_bounds, entered_intersect, entered_occluded);
 }
 
 #if RTC_VERSION_MAJOR == 3

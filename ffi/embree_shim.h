@@ -72,6 +72,23 @@ RTCGeometry st_new_entered_instance(RTCDevice device, const struct StEnteredInst
 /* A new, committed geometry of one user primitive; null on an error. */
 RTCGeometry st_new_user_geometry(RTCDevice device, const struct StUserShape *shape);
 
+/* As StIntersect, for one of many primitives. */
+typedef float (*StIntersectPrimitive)(const void *shape, uint32_t prim, const struct StRay *ray, uint32_t key, uint32_t instance);
+
+/* Writes the lower and the upper corner of the bounds of a primitive. */
+typedef void (*StPrimitiveBounds)(const void *shape, uint32_t prim, float *lower, float *upper);
+
+/* The user data of a user geometry of many primitives. It must outlive the geometry. */
+struct StUserPrimitives {
+    const void *shape;
+    uint32_t count;
+    StIntersectPrimitive intersect;
+    StPrimitiveBounds bounds;
+};
+
+/* A new, committed geometry of user primitives; null on an error. */
+RTCGeometry st_new_user_primitives(RTCDevice device, const struct StUserPrimitives *primitives);
+
 /* The user data of triangles with holes or slivers. It must outlive the geometry. */
 struct StFilter {
     const void *user;

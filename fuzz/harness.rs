@@ -8,6 +8,7 @@ use std::path::Path;
 use steradian::assets;
 use steradian::assets::MeshData;
 use steradian::config::{self, Trust};
+use steradian::geometry::{CurveBasis, CurveKind, Curves, Strands};
 use steradian::import::{self, ImportOptions};
 use steradian::render::RenderProvenance;
 
@@ -37,6 +38,17 @@ pub fn read(kind: &str, data: &[u8], folder: &Path) {
         "ply" => {
             if let Ok(mesh) = assets::read_ply(&write("m.ply", data)) {
                 look_at(&mesh);
+            }
+        }
+        "strands" => {
+            if let Ok(strands) = assets::read_strands(&write("s.txt", data)) {
+                let total: u64 = strands.counts.iter().map(|&count| u64::from(count)).sum();
+                let strands = Strands { points: strands.points, counts: strands.counts };
+                for basis in [CurveBasis::Linear, CurveBasis::Bezier, CurveBasis::BSpline, CurveBasis::CatmullRom] {
+                    if let Ok(curves) = Curves::new(strands.clone(), basis, CurveKind::Round) {
+                        assert!(curves.point_count() as u64 == total && curves.prim_count() > 0);
+                    }
+                }
             }
         }
         "image" => {

@@ -7,8 +7,8 @@ pub use inputs::{AlphaInput, CoatInput, ColorInput, Facets, PlasticCoat, RangedI
 pub use principled::PrincipledInputs;
 
 use crate::bsdf::{
-    Beckmann, Bsdf, BsdfFlags, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Phong,
-    Plastic, Principled, SeparableGgx, SingleScatteringBsdf, ThinDielectric,
+    Beckmann, Bsdf, BsdfFlags, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Hair, Lambert, Mirror, Phong,
+    Plastic, Principled, SeparableGgx, SingleScatteringBsdf, ThinDielectric, hair_absorption_of_color,
 };
 use crate::color::Rgb;
 use crate::id::{MaterialId, TextureId};
@@ -137,6 +137,36 @@ pub enum TexturedMaterial {
     },
     /// The principled model.
     Principled(PrincipledInputs),
+    /// Hair.
+    Hair {
+        /// What it absorbs.
+        color: HairColor,
+        /// Index of refraction over that of the outside.
+        ior: f32,
+        /// Roughness along and around it.
+        roughness: [f32; 2],
+        /// The tilt of its scales in radians.
+        tilt: f32,
+    },
+}
+
+/// What hair absorbs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum HairColor {
+    /// Absorption per radius.
+    Absorption(Rgb),
+    /// The colour that many strands have together.
+    Reflectance(ColorInput),
+}
+
+impl HairColor {
+    /// The absorption per radius, for a roughness around the hair.
+    fn absorption(self, azimuthal: f32, textures: &[Texture], footprint: &Footprint) -> Rgb {
+        match self {
+            Self::Absorption(sigma_a) => sigma_a,
+            Self::Reflectance(color) => hair_absorption_of_color(color.at(textures, footprint), azimuthal),
+        }
+    }
 }
 
 impl Facets {
@@ -223,11 +253,8 @@ impl TexturedMaterial {
             }
             Self::ThinDielectric { ior, tints } => {
                 let [reflection_tint, transmission_tint] = tints.map(|tint| tint.at(textures, footprint));
-                Bsdf::ThinDielectric(ThinDielectric {
-                    ior: ior.at(textures, footprint),
-                    reflection_tint,
-                    transmission_tint,
-                })
+                let ior = ior.at(textures, footprint);
+                Bsdf::ThinDielectric(ThinDielectric { ior, reflection_tint, transmission_tint })
             }
             Self::Plastic { coat, albedo, tint, nonlinear } => {
                 let (albedo, tint) = (albedo.at(textures, footprint), tint.at(textures, footprint));
@@ -238,6 +265,9 @@ impl TexturedMaterial {
                 Bsdf::coated(coat.at(textures, footprint), tint.at(textures, footprint), base)
             }
             Self::Principled(inputs) => Bsdf::Principled(Principled::new(&inputs.parameters(textures, footprint))),
+            Self::Hair { color, ior, roughness, tilt } => {
+                Bsdf::Hair(Hair::new(color.absorption(roughness[1], textures, footprint), *ior, *roughness, *tilt))
+            }
         }
     }
 
@@ -290,6 +320,8 @@ impl TexturedMaterial {
                 found.extend(base.textures());
             }
             Self::Principled(inputs) => found = inputs.textures(),
+            Self::Hair { color: HairColor::Reflectance(color), .. } => found.extend(color.texture()),
+            Self::Hair { .. } => {}
         }
         found
     }
@@ -309,6 +341,7 @@ impl TexturedMaterial {
             Self::Plastic { coat, .. } => coat.flags() | F::DIFFUSE,
             Self::Coated { coat, base, .. } => coat.flags() | base.flags(),
             Self::Principled(inputs) => inputs.flags(),
+            Self::Hair { .. } => F::GLOSSY | both_sides | F::ANISOTROPIC | F::FIBER,
         }
     }
 }

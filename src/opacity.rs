@@ -1,6 +1,6 @@
 //! Opacity: surfaces with holes, by a number or a texture.
 
-use crate::geometry::{AlphaMask, Hit, Mesh, Shape};
+use crate::geometry::{AlphaMask, Detail, Hit, Mesh, Shape};
 use crate::id::{PrimId, ShapeId};
 use crate::math::{Ray, Vec2};
 use crate::texture::{Footprint, SolidTable, Solidity, Texture};
@@ -36,7 +36,7 @@ impl Opacity {
             let texture = texture?;
             let image = match shape {
                 Shape::Mesh(mesh) => SolidTable::new(&texture).map(|table| ImageHoles::new(mesh, table)),
-                Shape::Analytic(_) => None,
+                Shape::Analytic(_) | Shape::Curves(_) | Shape::Points(_) => None,
             };
             Some(Holes { texture, image })
         };
@@ -63,7 +63,7 @@ impl AlphaMask for Opacity {
                 attributes: mesh.attributes_at(hit.prim, hit.u, hit.v),
                 ..Footprint::point(mesh.uv(hit.prim, hit.u, hit.v))
             },
-            Shape::Analytic(placed) => match placed.interaction(ray, hit) {
+            _ => match shape.interaction(Detail::Full, ray, hit) {
                 Some(at) => Footprint::point(at.uv),
                 // A rounding artefact, which the integrator looks past.
                 None => return 1.0,

@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 
 use flate2::read::GzDecoder;
 
-const KINDS: [&str; 10] =
-    ["scene_json", "obj", "ply", "image", "mitsuba_xml", "pbrt", "gltf", "config", "recipe", "volume"];
+const KINDS: [&str; 11] =
+    ["scene_json", "obj", "ply", "image", "mitsuba_xml", "pbrt", "gltf", "config", "recipe", "strands", "volume"];
 
 fn check(kind: &str, bytes: &[u8], folder: &Path, file: &Path) {
     let start = Instant::now();
@@ -53,6 +53,6 @@ fn every_file_of_the_corpus_is_read_or_refused() {
         check(&kind, &bytes, folder.path(), &file);
         counts[which] += 1;
     }
-    // Recipes and volumes have named files only.
-    assert!(counts[..KINDS.len() - 2].iter().all(|count| *count > 50), "{counts:?}");
+    // Recipes, strands and volumes have named files only.
+    assert!(counts[..KINDS.len() - 3].iter().all(|count| *count > 50), "{counts:?}");
 }

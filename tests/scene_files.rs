@@ -32,7 +32,7 @@ fn lit(shape: Value) -> Value {
 fn mesh(scene: &Scene, shape: usize) -> &Mesh {
     match &scene.geometry.shapes[shape] {
         Shape::Mesh(mesh) => mesh,
-        Shape::Analytic(_) => panic!("no mesh"),
+        _ => panic!("no mesh"),
     }
 }
 

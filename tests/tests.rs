@@ -29,6 +29,8 @@ mod checkpoints;
 mod cli;
 /// Scenes written again.
 mod conversion;
+/// Curves, points and hair.
+mod curves;
 /// Surfaces with holes, the same ones for every accelerator and every kind of query.
 mod cutouts;
 /// Rays and instances at the end of what is one.

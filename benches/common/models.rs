@@ -36,7 +36,7 @@ impl Model {
     pub fn mesh(&self) -> &Mesh {
         match &self.geometry.shapes[0] {
             Shape::Mesh(mesh) => mesh,
-            Shape::Analytic(_) => unreachable!("models are meshes"),
+            _ => unreachable!("models are meshes"),
         }
     }
 }

@@ -14,6 +14,7 @@ mod obj_check;
 mod ply;
 mod ply_attributes;
 mod source;
+mod strands;
 mod volume;
 
 pub use environment_image::{RgbImage, read_rgb_image};
@@ -26,6 +27,7 @@ pub use mtl_maps::{ObjMap, ObjMaps};
 pub use obj::{ObjMaterial, ObjMesh, read_obj};
 pub use ply::{read_ply, read_ply_attributes};
 pub use source::SceneSource;
+pub use strands::{StrandData, read_strands};
 pub use volume::{VolHeader, VolumeData, read_raw_volume, read_vol, read_vol_header, vol_bytes};
 
 use std::path::{Path, PathBuf};

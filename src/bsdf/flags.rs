@@ -1,7 +1,7 @@
 //! What kinds of lobes a BSDF has.
 
 bitflags::bitflags! {
-    /// Kinds of lobes, as in pbrt, and whether any of them is anisotropic.
+    /// Kinds of lobes, as in pbrt, whether any of them is anisotropic, and whether they are those of a fibre.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub struct BsdfFlags: u8 {
         /// Light stays on its side of the surface.
@@ -16,6 +16,8 @@ bitflags::bitflags! {
         const SPECULAR = 1 << 4;
         /// Scattering depends on the direction of the frame's tangents.
         const ANISOTROPIC = 1 << 5;
+        /// Scattering of a whole fibre, with the first tangent along it.
+        const FIBER = 1 << 6;
     }
 }
 

@@ -14,6 +14,7 @@ mod eon;
 mod flags;
 pub mod fresnel;
 mod glossy;
+mod hair;
 mod lambert;
 mod microfacet;
 mod mirror;
@@ -39,6 +40,7 @@ pub use energy::bake as bake_energy_tables;
 pub use eon::Eon;
 pub use flags::BsdfFlags;
 pub use glossy::Glossy;
+pub use hair::{Hair, hair_absorption, hair_absorption_of_color};
 pub use lambert::{DiffuseDirection, Lambert};
 pub use microfacet::{Ggx, Microfacets, SMOOTH_ALPHA, SeparableGgx};
 pub use mirror::Mirror;
@@ -130,6 +132,8 @@ pub enum Bsdf {
     SeparableGgx(SingleScatteringBsdf<SeparableGgx>),
     /// Scattering within a medium.
     Phase(Phase),
+    /// A hair.
+    Hair(Hair),
 }
 
 // Constructed at every hit: no kind may make the others slower to pass around.
@@ -153,6 +157,7 @@ macro_rules! each {
             Bsdf::Beckmann($bsdf) => $body,
             Bsdf::SeparableGgx($bsdf) => $body,
             Bsdf::Phase($bsdf) => $body,
+            Bsdf::Hair($bsdf) => $body,
         }
     };
 }

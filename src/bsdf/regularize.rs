@@ -26,7 +26,8 @@ impl Bsdf {
             | Self::Mirror(_)
             | Self::ThinDielectric(_)
             | Self::Phong(_)
-            | Self::Phase(_) => {
+            | Self::Phase(_)
+            | Self::Hair(_) => {
                 return None;
             }
         })

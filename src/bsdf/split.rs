@@ -11,7 +11,9 @@ impl Bsdf {
     pub fn diffuse_fraction(&self, wo: Vec3, wi: Vec3) -> Rgb {
         match self {
             Self::Lambert(_) | Self::Eon(_) | Self::DiffuseTransmission(_) | Self::Phase(_) => Rgb::WHITE,
-            Self::Mirror(_) | Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => Rgb::BLACK,
+            Self::Mirror(_) | Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) | Self::Hair(_) => {
+                Rgb::BLACK
+            }
             Self::Glossy(bsdf) => bsdf.diffuse_fraction(wo, wi),
             Self::Phong(bsdf) => bsdf.diffuse_fraction(wo, wi),
             Self::Plastic(bsdf) => bsdf.diffuse_fraction(wo, wi),

@@ -54,7 +54,7 @@ fn find(geometry: &Geometry, look_alike: impl Fn(ShapeId, ShapeId) -> bool) -> O
     let meshes: Vec<(u64, ShapeId, &Mesh)> = meshes
         .filter_map(|(group, id)| match geometry.shape(id) {
             Shape::Mesh(mesh) => Some((hash64(group as u64), id, mesh)),
-            Shape::Analytic(_) => None,
+            Shape::Analytic(_) | Shape::Curves(_) | Shape::Points(_) => None,
         })
         .collect();
     let keys = keys(&meshes);

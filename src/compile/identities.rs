@@ -121,5 +121,7 @@ fn kind(desc: &ShapeDesc) -> &'static str {
         ShapeDesc::Cylinder(_) => "cylinder",
         ShapeDesc::Cone(_) => "cone",
         ShapeDesc::Revolution(_) => "revolution",
+        ShapeDesc::Curves(_) => "curves",
+        ShapeDesc::Points(_) => "points",
     }
 }

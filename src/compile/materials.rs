@@ -219,6 +219,7 @@ impl Compiler<'_> {
             | MaterialDesc::Relief { .. } => {
                 return Err(files.error(path, "cannot be part of a material"));
             }
+            MaterialDesc::Hair(desc) => self.hair(path, desc)?.into(),
             MaterialDesc::Plastic(desc) => self.plastic(path, desc)?.into(),
             MaterialDesc::Principled(desc) => TexturedMaterial::Principled(self.principled(path, desc)?).into(),
         })

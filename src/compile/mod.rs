@@ -7,8 +7,10 @@ mod changes;
 mod check;
 mod coincident;
 mod composites;
+mod curves;
 mod faults;
 mod file_cache;
+mod hair;
 mod identities;
 mod keyframes;
 mod lights;
@@ -264,7 +266,7 @@ impl Builder {
             analytic_shapes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Analytic(_))),
             instances: !self.geometry.instances.is_empty(),
             textures: materials.iter().any(Material::is_textured),
-            attributes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Mesh(mesh) if mesh.has_attributes())),
+            attributes: self.geometry.shapes.iter().any(Shape::has_attributes),
             filtered_textures: materials.iter().any(Material::is_textured)
                 && self.materials.textures.textures.iter().any(Texture::is_filtered),
             image_textures: self.materials.textures.textures.iter().any(Texture::has_image),

@@ -1,5 +1,6 @@
 //! Shapes of the scene file: loaded and checked once, placed once or (emitters of objects) once per instance.
 
+use super::curves::StrandSource;
 use super::materials::MaterialBinding;
 use super::normals::Smoothing;
 use super::planes::{self, Plane};
@@ -51,11 +52,19 @@ pub struct PreparedEmission {
     group: Option<LightGroupId>,
 }
 
+/// Where a shape stands and how it moves.
+struct PlacedBy {
+    map: DAffine3,
+    motion: Option<Motion>,
+}
+
 #[derive(Clone, Debug)]
 enum ShapeSource {
     Analytic(Analytic),
     /// Placed when everything else has been.
     Plane(Plane),
+    /// Curves or points.
+    Strands(StrandSource),
     Mesh {
         data: MeshData,
         shading: MeshShadingDesc,
@@ -86,6 +95,7 @@ impl PreparedShape {
         let own = match &self.form {
             ShapeSource::Analytic(surface) => surface.bounds(),
             ShapeSource::Plane(_) => Bounds::EMPTY,
+            ShapeSource::Strands(strands) => strands.bounds(),
             ShapeSource::Mesh { data, later, .. } => {
                 std::iter::once(data).chain(later).map(MeshData::bounds).fold(Bounds::EMPTY, |all, b| all.union(&b))
             }
@@ -123,6 +133,9 @@ impl Builder {
             return Err(self.files.error(&format!("{path}.motion"), "a shape that emits light cannot move"));
         }
         let surface = PreparedSurface { binding, emission, identity };
+        if let ShapeDesc::Curves(_) | ShapeDesc::Points(_) = desc {
+            return self.prepare_strands(path, desc, is_used, PlacedBy { map, motion }, surface);
+        }
         if !matches!(desc, ShapeDesc::Mesh(_)) {
             self.check_attributes(path, None, &surface, common.material, None)?;
         }
@@ -208,6 +221,36 @@ impl Builder {
         Ok(prepared)
     }
 
+    fn prepare_strands(
+        &mut self,
+        path: &str,
+        desc: &ShapeDesc,
+        is_used: bool,
+        PlacedBy { map, motion }: PlacedBy,
+        surface: PreparedSurface,
+    ) -> Result<Vec<PreparedShape>> {
+        let common = desc.common();
+        let material = surface.binding.material;
+        self.check_strands(path, &common, material)?;
+        let (file, is_fiber) = match desc {
+            ShapeDesc::Curves(curves) => (curves.file.as_deref(), self.is_fiber(material)),
+            ShapeDesc::Points(points) => (points.file.as_deref(), false),
+            _ => return Ok(Vec::new()),
+        };
+        if let Some(file) = file.filter(|_| !is_used) {
+            self.files.warn_of_missing(&format!("{path}.file"), file);
+            return Ok(Vec::new());
+        }
+        let mut strands = match desc {
+            ShapeDesc::Curves(curves) => self.curves(path, curves, is_fiber)?,
+            ShapeDesc::Points(points) => self.points(path, points)?,
+            _ => return Ok(Vec::new()),
+        };
+        self.check_attributes(path, file, &surface, common.material, strands.attributes_mut())?;
+        let form = ShapeSource::Strands(strands);
+        Ok(vec![PreparedShape { form, map, motion, reverse_normal: false, surface, path: path.into() }])
+    }
+
     fn smoothing(&self, path: &str, desc: &MeshDesc) -> Result<Smoothing> {
         let crease = desc.crease_angle_degrees;
         let crease = crease
@@ -271,6 +314,7 @@ impl Builder {
         };
         Ok(Some(match form {
             ShapeSource::Analytic(surface) => analytic(surface),
+            ShapeSource::Strands(strands) => self.placed_strands(path, strands, transform)?,
             ShapeSource::Plane(plane) => {
                 let quad = planes::square(&plane, &transform.world_from_object, &self.surroundings);
                 analytic(Analytic::Quad(quad.ok_or_else(|| self.files.error(path, TOO_LARGE))?))

@@ -5,10 +5,13 @@ use crate::desc::{ProfileDesc, ProfileParameterDesc, ShapeDesc};
 use crate::error::Result;
 use crate::geometry::{Analytic, Disk, Frustum, Profile, ProfileParameter, Quad, Revolution, ShapeError, Sphere};
 
-/// The analytic surface of a shape; `None` for meshes, cubes, and planes (whose extent depends on the scene).
+/// The analytic surface of a shape; `None` for meshes, cubes, curves, points, and planes (whose extent depends on the
+/// scene).
 pub fn compile(files: &CompileContext, path: &str, desc: &ShapeDesc) -> Result<Option<Analytic>> {
     let surface = match desc {
-        ShapeDesc::Mesh(_) | ShapeDesc::Cube(_) | ShapeDesc::Plane(_) => return Ok(None),
+        ShapeDesc::Mesh(_) | ShapeDesc::Cube(_) | ShapeDesc::Plane(_) | ShapeDesc::Curves(_) | ShapeDesc::Points(_) => {
+            return Ok(None);
+        }
         ShapeDesc::Sphere(s) => {
             let (z_min, z_max) = (s.z_min.unwrap_or(-s.radius), s.z_max.unwrap_or(s.radius));
             Sphere::new(s.radius, z_min, z_max, s.phi_max_degrees.to_radians()).map(Analytic::Sphere)

@@ -55,6 +55,8 @@ impl Summary {
                     meshes += 1;
                 }
                 Shape::Analytic(placed) => *shapes.entry(kind_of(&placed.shape)).or_default() += 1,
+                Shape::Curves(curves) => *shapes.entry("curve").or_default() += curves.strand_count(),
+                Shape::Points(points) => *shapes.entry("point").or_default() += points.prim_count(),
             }
         }
         let mut lights = BTreeMap::new();
@@ -111,7 +113,7 @@ fn seen_triangles(scene: &Scene) -> u64 {
     let count = |ids: &[crate::id::ShapeId]| -> u64 {
         let triangles = |id: &crate::id::ShapeId| match geometry.shape(*id) {
             Shape::Mesh(mesh) => mesh.triangles().len() as u64,
-            Shape::Analytic(_) => 0,
+            Shape::Analytic(_) | Shape::Curves(_) | Shape::Points(_) => 0,
         };
         ids.iter().map(triangles).sum()
     };

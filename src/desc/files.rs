@@ -1,6 +1,6 @@
 //! The files that a scene names.
 
-use super::{LightDesc, SceneDesc, ShapeDesc, TextureDesc, VolumeDesc};
+use super::{CurvesDesc, LightDesc, PointsDesc, SceneDesc, ShapeDesc, TextureDesc, VolumeDesc};
 
 /// A file that a scene names.
 #[derive(Debug)]
@@ -28,7 +28,9 @@ impl SceneDesc {
                 .map(move |(i, shape)| (format!("objects.{name}.shapes[{i}]"), shape, is_used))
         });
         for (path, shape, is_used) in shapes.chain(objects) {
-            if let ShapeDesc::Mesh(mesh) = shape {
+            if let ShapeDesc::Curves(CurvesDesc { file, .. }) | ShapeDesc::Points(PointsDesc { file, .. }) = shape {
+                files.extend(file.as_mut().map(|name| NamedFile { path: format!("{path}.file"), name, is_used }));
+            } else if let ShapeDesc::Mesh(mesh) = shape {
                 let file = mesh.file.as_mut().map(|file| (format!("{path}.file"), file));
                 let later = mesh
                     .deform_files

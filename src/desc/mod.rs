@@ -7,13 +7,17 @@
 
 mod build;
 mod camera;
+mod curves;
 mod files;
+mod hair;
 mod light;
 mod lists;
 mod material;
 mod medium;
+mod mesh;
 mod output;
 mod principled;
+mod relief;
 mod settings;
 mod shape;
 mod texture;
@@ -21,27 +25,31 @@ mod transform;
 mod used;
 
 pub use camera::{BladesDesc, CameraDesc, CameraKindDesc, LensDesc};
+pub use curves::{CurveBasisDesc, CurveKindDesc};
 pub use files::NamedFile;
+pub use hair::{HairDesc, HairIor, HairRoughness, HairTilt};
 pub use light::{
     DirectionalLightDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, PointLightDesc, ProjectorLightDesc,
     SpotLightDesc,
 };
 pub use material::{
-    BumpMapDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, PhongLobeDesc, PlasticDesc,
-    RangedDesc, RoughnessDesc, ScalarDesc,
+    ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, PlasticDesc, RangedDesc, RoughnessDesc,
+    ScalarDesc,
 };
 pub use medium::{AbsorptionDesc, BorderDesc, CoefficientDesc, MediumDesc, MediumVolumeDesc, PhaseDesc, VolumeDesc};
+pub use mesh::{AttributeDesc, MeshShadingDesc, NormalWeightDesc, SmoothByDesc};
 pub use output::{CompressionDesc, CryptoManifestDesc, ExrProfileDesc, LayerKind, OutputDesc, PixelTypeDesc, ViewDesc};
 pub(crate) use principled::principled_parameters;
 pub use principled::{PrincipledDesc, PrincipledModelDesc};
+pub use relief::{BumpMapDesc, NormalMapDesc};
 pub use settings::{
     CausticsDesc, DEFAULT_RR_DEPTH, FilmDesc, FilterDesc, FilterSamplesDesc, IntegratorDesc, MAX_FILTER_RADIUS,
     MAX_SIDE, RouletteDesc, SamplerDesc, SamplerKindDesc, StrategyDesc,
 };
 pub use shape::{
-    AttributeDesc, ConeDesc, CubeDesc, CylinderDesc, DiskDesc, EmissionDesc, InstanceDesc, MeshDesc, MeshShadingDesc,
-    NormalWeightDesc, ObjectDesc, OpacityDesc, PlaneDesc, ProfileDesc, ProfileParameterDesc, QuadDesc, RevolutionDesc,
-    ShapeCommon, ShapeCommonMut, ShapeDesc, SmoothByDesc, SphereDesc,
+    ConeDesc, CubeDesc, CurvesDesc, CylinderDesc, DiskDesc, EmissionDesc, InstanceDesc, MeshDesc, ObjectDesc,
+    OpacityDesc, PlaneDesc, PointsDesc, ProfileDesc, ProfileParameterDesc, QuadDesc, RevolutionDesc, ShapeCommon,
+    ShapeCommonMut, ShapeDesc, SphereDesc,
 };
 pub use texture::{ChannelDesc, ColorSpaceDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
 pub use transform::{KeyframeDesc, ScaleDesc, TransformDesc, TransformStepDesc};

@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::curves::{CurveBasisDesc, CurveKindDesc, radius_scale};
 use super::lists::{OneOrMore, Spread, one_or_more, spread};
+use super::mesh::{AttributeDesc, MeshShadingDesc, NormalWeightDesc, SmoothByDesc};
 use super::{KeyframeDesc, TransformDesc};
 
 /// Declares the shapes: a struct for each, the fields that all share, and the enum over them.
@@ -289,6 +291,56 @@ shapes! {
         #[serde(default = "full_turn")]
         phi_max_degrees: f64,
     }
+    /// Curves: hair, fur, grass, threads; strands of control points with a radius each, from a file or inline by
+    /// `strands`. u runs from 0 to 1 along each strand from its first point; v runs around a tube and across a ribbon,
+    /// unless there are `root_uvs`. Rays meet curves from outside only, also those that have crossed one: materials
+    /// scatter light as a whole fibre does. The ends of strands are open. The transform keeps angles; curves cannot
+    /// emit light.
+    Curves(CurvesDesc) {
+        /// A file of strands, relative to the scene file: as text, a line `x y z radius` for each control point and an
+        /// empty line between strands, as those of Mitsuba; or in binary form: the bytes `STRANDS1`, the number of
+        /// strands and that of points, the number of points of each strand (whole numbers of 32 bits) and x, y, z and
+        /// radius of each point (floats of 32 bits), all with the lowest byte first.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        file: Option<String>,
+        /// Inline: the control points `[x, y, z, radius]` of each strand.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        strands: Option<Vec<Vec<[f64; 4]>>>,
+        /// How control points make a curve. Default: `b_spline`.
+        #[serde(default)]
+        basis: CurveBasisDesc,
+        /// What the surface is. Default: `round`.
+        #[serde(default)]
+        kind: CurveKindDesc,
+        /// Factor on all radii, above 0. Default: 1.
+        #[serde(default = "radius_scale", skip_serializing_if = "is_one")]
+        radius_scale: f64,
+        /// A linear colour for each strand, or for each control point of all strands, which is the attribute
+        /// `vertex_color`. Default: none.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        colors: Option<Vec<[f32; 3]>>,
+        /// One uv for each strand, such as that of its root on the skin, for textures in place of those along and
+        /// across. Default: none.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        root_uvs: Option<Vec<[f32; 2]>>,
+    }
+    /// Spheres by the million as one shape: `centers` inline, or the vertices of a PLY file. uv are those of a sphere.
+    /// The transform keeps angles; points cannot emit light.
+    Points(PointsDesc) {
+        /// A PLY file, relative to the scene file, whose vertices are the centres. Its attribute `vertex_radius`, if
+        /// it has one (a property `radius_x`), has the radii.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        file: Option<String>,
+        /// Inline: the centres.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        centers: Option<Vec<[f64; 3]>>,
+        /// Inline: a radius for each centre; 0 makes a sphere invisible. Default: `radius` for all.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        radii: Option<Vec<f32>>,
+        /// The radius of all, or a factor on the radii of the file or of `radii`; above 0. Default: 1.
+        #[serde(default = "radius_scale")]
+        radius: f64,
+    }
 }
 
 /// A profile curve of points `[x, y]`.
@@ -316,57 +368,13 @@ pub enum ProfileParameterDesc {
     ArcLength,
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde expects")]
+fn is_one(value: &f64) -> bool {
+    *value == 1.0
+}
+
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
-}
-
-/// How a mesh's normals are found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum MeshShadingDesc {
-    /// Given normals are interpolated; without them the mesh is flat.
-    #[default]
-    Auto,
-    /// Flat, even where normals are given.
-    Flat,
-    /// Smooth: given normals, or computed ones where none are given.
-    Smooth,
-    /// Smooth with computed normals, even where normals are given.
-    Computed,
-}
-
-/// How computed normals are averaged over the triangles around a vertex.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum NormalWeightDesc {
-    /// By the angle of the triangle at the vertex: does not depend on how faces are cut into triangles.
-    #[default]
-    Angle,
-    /// By the area of the triangle: large faces stay flatter.
-    Area,
-    /// All the same.
-    Uniform,
-}
-
-/// Which triangles computed normals are averaged over.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum SmoothByDesc {
-    /// Those with a corner at the same position: no seams where a file has several vertices at one place, for their uv.
-    #[default]
-    Position,
-    /// Those with the same vertex.
-    Index,
-}
-
-/// The values of an attribute of a mesh: a number each, or a linear colour each.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(untagged, expecting = "expected a list of numbers, or of colours such as [0.5, 0.2, 0.1]")]
-pub enum AttributeDesc {
-    /// Numbers.
-    Numbers(Vec<f32>),
-    /// Linear colours.
-    Colors(Vec<[f32; 3]>),
 }
 
 impl MeshDesc {

@@ -37,13 +37,21 @@ impl Geometry {
     /// The attributes of the surface at a point; `None` if it has none.
     #[inline(never)]
     pub fn attributes(&self, at: &SurfaceInteraction) -> Option<AttributePoint<'_>> {
-        let Shape::Mesh(mesh) = self.shape(at.shape) else { return None };
+        let mesh = match self.shape(at.shape) {
+            Shape::Mesh(mesh) => mesh,
+            Shape::Curves(curves) => return curves.attributes_at(at.prim, self.local_point(at)),
+            Shape::Analytic(_) | Shape::Points(_) => return None,
+        };
         if !mesh.has_attributes() {
             return None;
         }
-        let p =
-            if at.is_instanced() { self.instance(at.instance).transform_at(at.time).inverse_point(at.p) } else { at.p };
+        let p = self.local_point(at);
         Some(mesh.attribute_point(at.prim, mesh.weights_at(at.prim, p, at.time).map(|weight| weight as f32)))
+    }
+
+    /// A point of a surface in the space that its shape is placed in.
+    fn local_point(&self, at: &SurfaceInteraction) -> DVec3 {
+        if at.is_instanced() { self.instance(at.instance).transform_at(at.time).inverse_point(at.p) } else { at.p }
     }
 }
 

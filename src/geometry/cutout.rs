@@ -62,14 +62,12 @@ impl AlphaMasks {
     }
 }
 
-/// Distinguishes the hits of a ray with one analytic shape, which have the same ids: it enters and leaves from
-/// different sides. Distances would not do, for accelerators round them differently.
+/// Distinguishes the hits of a ray with one primitive that is no triangle, which have the same ids: it enters and
+/// leaves from different sides. Distances would not do, for accelerators round them differently.
 fn side(shape: &Shape, ray: &Ray, hit: &Hit) -> u32 {
     match shape {
         Shape::Mesh(_) => 0,
-        Shape::Analytic(placed) => {
-            placed.interaction_with(Detail::Position, ray, hit).is_some_and(|at| at.n_g.dot(ray.direction) > 0.0).into()
-        }
+        _ => shape.interaction(Detail::Position, ray, hit).is_some_and(|at| at.n_g.dot(ray.direction) > 0.0).into(),
     }
 }
 

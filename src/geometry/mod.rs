@@ -2,6 +2,8 @@
 //! lights.
 
 mod attributes;
+mod curves;
+mod curves_error;
 mod cutout;
 mod disk;
 mod frustum;
@@ -12,6 +14,7 @@ mod mesh;
 mod mesh_error;
 mod moving;
 mod placed;
+mod point_cloud;
 mod profile;
 mod quad;
 mod revolution;
@@ -24,6 +27,8 @@ mod testing;
 mod triangle;
 mod uv;
 
+pub use curves::{CurveBasis, CurveKind, Curves, Strands};
+pub use curves_error::CurvesError;
 pub use cutout::{AlphaMask, AlphaMasks};
 pub use disk::Disk;
 pub use frustum::Frustum;
@@ -37,6 +42,7 @@ pub use placed::{
     Analytic, LocalHit, LocalSurface, PACKET_SIZE, PacketHits, RayPacket, ShapeSample, SurfacePoint, TransformedShape,
     WorldNormalRows, WorldPointRows, WorldSampleRows,
 };
+pub use point_cloud::Points;
 pub use profile::Profile;
 pub use quad::Quad;
 pub use revolution::{ProfileParameter, Revolution};
@@ -51,7 +57,7 @@ use crate::id::{InstanceId, ObjectId, PrimId, ShapeId};
 use crate::math::float::step_past;
 use crate::math::{Aabb, DVec3, Ray, Vec3};
 
-/// A triangle mesh or one analytic surface.
+/// A triangle mesh, one analytic surface, curves, or points.
 ///
 /// Analytic surfaces are stored in place: a box would cost a cache miss at every hit, and there are few shapes.
 #[allow(clippy::large_enum_variant)]
@@ -61,14 +67,20 @@ pub enum Shape {
     Mesh(Mesh),
     /// A surface given by a formula, with its transform.
     Analytic(TransformedShape),
+    /// Curves, in the space they are placed in.
+    Curves(Box<Curves>),
+    /// Spheres, in the space they are placed in.
+    Points(Box<Points>),
 }
 
 impl Shape {
-    /// How many primitives the shape has: triangles, or one.
+    /// How many primitives the shape has: triangles, segments of curves, points, or one.
     pub fn prim_count(&self) -> usize {
         match self {
             Self::Mesh(mesh) => mesh.triangles().len(),
             Self::Analytic(_) => 1,
+            Self::Curves(curves) => curves.prim_count(),
+            Self::Points(points) => points.prim_count(),
         }
     }
 
@@ -78,6 +90,17 @@ impl Shape {
         match self {
             Self::Mesh(mesh) => mesh.triangle_bounds(prim),
             Self::Analytic(placed) => placed.bounds().padded(),
+            Self::Curves(curves) => curves.prim_bounds(prim),
+            Self::Points(points) => points.prim_bounds(prim),
+        }
+    }
+
+    /// Whether textures can take attributes of it.
+    pub fn has_attributes(&self) -> bool {
+        match self {
+            Self::Mesh(mesh) => mesh.has_attributes(),
+            Self::Curves(curves) => curves.has_attributes(),
+            Self::Analytic(_) | Self::Points(_) => false,
         }
     }
 
@@ -86,15 +109,48 @@ impl Shape {
         match self {
             Self::Mesh(mesh) => mesh.bounds(),
             Self::Analytic(placed) => placed.bounds().padded(),
+            Self::Curves(curves) => curves.bounds(),
+            Self::Points(points) => points.bounds(),
         }
     }
 
     /// The interaction for a hit of `ray`, in the space the shape is placed in; see [`Geometry::interaction`].
     #[inline]
-    fn interaction(&self, detail: Detail, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
+    pub(crate) fn interaction(&self, detail: Detail, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
         match self {
             Self::Mesh(mesh) => mesh.interaction(detail, ray, hit),
             Self::Analytic(placed) => placed.interaction_with(detail, ray, hit),
+            Self::Curves(_) | Self::Points(_) => self.many_interaction_and_dp_dv(detail, ray, hit).map(|(at, _)| at),
+        }
+    }
+
+    /// The interaction with curves or points, with the change of the point with v. Apart, so that the code of other
+    /// shapes stays small.
+    #[inline(never)]
+    fn many_interaction_and_dp_dv(&self, detail: Detail, ray: &Ray, hit: &Hit) -> Option<(SurfaceInteraction, Vec3)> {
+        match self {
+            Self::Curves(curves) => curves.interaction_and_dp_dv(ray, hit),
+            Self::Points(points) => points.interaction_and_dp_dv(detail, ray, hit),
+            Self::Mesh(_) | Self::Analytic(_) => None,
+        }
+    }
+
+    /// The interaction with the change of the point with v.
+    fn interaction_and_dp_dv(&self, ray: &Ray, hit: &Hit) -> Option<(SurfaceInteraction, Vec3)> {
+        match self {
+            Self::Mesh(mesh) => mesh.interaction_and_dp_dv(Detail::Full, ray, hit),
+            Self::Analytic(placed) => placed.interaction_and_dp_dv(Detail::Full, ray, hit),
+            Self::Curves(_) | Self::Points(_) => self.many_interaction_and_dp_dv(Detail::Full, ray, hit),
+        }
+    }
+
+    /// The distance of the first hit with one of curves or points.
+    #[inline(never)]
+    fn many_distance(&self, ray: &Ray, prim: PrimId) -> Option<f32> {
+        match self {
+            Self::Curves(curves) => curves.intersect(prim, ray),
+            Self::Points(points) => points.intersect(prim, ray),
+            Self::Mesh(_) | Self::Analytic(_) => None,
         }
     }
 
@@ -111,6 +167,10 @@ impl Shape {
             Self::Analytic(placed) => {
                 let hit = placed.intersect(ray)?;
                 Some(Hit { t: hit.t as f32, u: 0.0, v: 0.0, shape, prim, instance })
+            }
+            Self::Curves(_) | Self::Points(_) => {
+                let t = self.many_distance(ray, prim)?;
+                Some(Hit { t, u: 0.0, v: 0.0, shape, prim, instance })
             }
         }
     }
@@ -179,9 +239,9 @@ impl Geometry {
             if self.cutouts.counts(&self.shapes, key, &ray, &hit) {
                 return Some(hit);
             }
-            // A triangle is met once; behind a hole of an analytic surface there may be more of it.
+            // A triangle is met once; behind a hole of another surface there may be more of it.
             ray.t_min = match shape {
-                Shape::Analytic(_) if hit.t < ray.t_max => step_past(hit.t),
+                Shape::Analytic(_) | Shape::Curves(_) | Shape::Points(_) if hit.t < ray.t_max => step_past(hit.t),
                 _ => return None,
             };
         }
@@ -205,6 +265,8 @@ impl Geometry {
             .map(|shape| match shape {
                 Shape::Mesh(mesh) => mesh.memory_bytes(),
                 Shape::Analytic(_) => 0,
+                Shape::Curves(curves) => curves.memory_bytes(),
+                Shape::Points(points) => points.memory_bytes(),
             })
             .sum();
         shapes + self.shapes.len() * size_of::<Shape>() + self.instances.len() * size_of::<Instance>()
@@ -240,13 +302,8 @@ impl Geometry {
     /// few surfaces need it.
     #[inline(never)]
     pub fn dp_dv(&self, ray: &Ray, hit: &Hit) -> Vec3 {
-        let local = |ray: &Ray| {
-            let found = match self.shape(hit.shape) {
-                Shape::Mesh(mesh) => mesh.interaction_and_dp_dv(Detail::Full, ray, hit),
-                Shape::Analytic(placed) => placed.interaction_and_dp_dv(Detail::Full, ray, hit),
-            };
-            found.map_or(Vec3::ZERO, |(_, dp_dv)| dp_dv)
-        };
+        let local =
+            |ray: &Ray| self.shape(hit.shape).interaction_and_dp_dv(ray, hit).map_or(Vec3::ZERO, |(_, dp_dv)| dp_dv);
         if hit.instance == Hit::NO_INSTANCE {
             return local(ray);
         }
@@ -260,8 +317,8 @@ impl Geometry {
     pub fn uv_density(&self, ray: &Ray, hit: &Hit) -> f32 {
         let local = |ray: &Ray| match self.shape(hit.shape) {
             Shape::Mesh(mesh) => mesh.edges_and_uv_area(hit.prim, ray.time),
-            Shape::Analytic(placed) => {
-                let found = placed.interaction_and_dp_dv(Detail::Full, ray, hit);
+            shape => {
+                let found = shape.interaction_and_dp_dv(ray, hit);
                 (found.map_or([Vec3::ZERO; 2], |(at, dp_dv)| [at.dp_du, dp_dv]), 1.0)
             }
         };

@@ -75,16 +75,7 @@ impl Sphere {
     /// Distance of the first hit within the ray's interval; NaN on a miss.
     #[inline(always)]
     pub fn distance(&self, ray: &RayF64) -> f64 {
-        // The point of the ray closest to the centre, then half the chord (Haines et al., "Precision Improvements for
-        // Ray/Sphere Intersection"). A zero direction gives a NaN, as the root of a negative number does, which fails
-        // every test.
-        let d = ray.direction;
-        let inverse = 1.0 / d.length_squared();
-        let t_middle = -ray.origin.dot(d) * inverse;
-        let foot = ray.origin + d * t_middle;
-        let half_chord_squared = self.radius * self.radius - foot.length_squared();
-        let t_half = (half_chord_squared * inverse).sqrt();
-        let (near, far) = (t_middle - t_half, t_middle + t_half);
+        let [near, far] = roots(ray.origin, ray.direction, self.radius);
         first_accepted([near, far], [self.accepts(ray, near), self.accepts(ray, far)])
     }
 
@@ -143,6 +134,21 @@ impl Sphere {
         let p = (self.sector.direction(u[0]) * rho).extend(z);
         ShapeSample { p, n: p / self.radius, pdf_area: 1.0 / self.area }
     }
+}
+
+/// Where a ray meets the whole sphere about the origin, in ascending order; NaN where it passes by.
+///
+/// The point of the ray closest to the centre, then half the chord (Haines et al., "Precision Improvements for
+/// Ray/Sphere Intersection"). A zero direction gives a NaN, as the root of a negative number does, which fails every
+/// test.
+#[inline(always)]
+pub(super) fn roots(origin: DVec3, direction: DVec3, radius: f64) -> [f64; 2] {
+    let inverse = 1.0 / direction.length_squared();
+    let t_middle = -origin.dot(direction) * inverse;
+    let foot = origin + direction * t_middle;
+    let half_chord_squared = radius * radius - foot.length_squared();
+    let t_half = (half_chord_squared * inverse).sqrt();
+    [t_middle - t_half, t_middle + t_half]
 }
 
 #[cfg(test)]

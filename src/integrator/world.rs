@@ -79,7 +79,7 @@ impl<'a> World<'a> {
     pub(super) fn resolves_in_rows(&self, shape: ShapeId) -> bool {
         match self.scene.geometry.shape(shape) {
             Shape::Analytic(placed) => !self.uses_uv(shape) || matches!(placed.shape, Analytic::Quad(_)),
-            Shape::Mesh(_) => false,
+            Shape::Mesh(_) | Shape::Curves(_) | Shape::Points(_) => false,
         }
     }
 

@@ -20,7 +20,7 @@ pub mod vectorize;
 pub use aabb::{Aabb, Bounds};
 pub use cone::RayCone;
 pub use frame::Frame;
-pub use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec2, Vec3, Vec4, dvec2, dvec3, vec2, vec3};
+pub use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, DVec4, Vec2, Vec3, Vec4, dvec2, dvec3, vec2, vec3};
 pub use motion::Motion;
 pub use random::Rng;
 pub use ray::{Ray, RayF64, RayRows};

@@ -113,7 +113,7 @@ pub(super) unsafe extern "C" fn enter_instance(
     RayLimits::OPEN.accepts(&RayWords::new(&local))
 }
 
-/// A shape with holes or slivers, as the user data of its geometry.
+/// A shape with holes, slivers or many primitives, as the user data of its geometry.
 pub(super) struct Filter {
     geometry: *const Geometry,
     shape: ShapeId,
@@ -151,6 +151,32 @@ pub(super) unsafe extern "C" fn intersect_cutout(
     let geometry = unsafe { filter.geometry() };
     let instance = Filter::instance(geometry, instance);
     geometry.intersect_prim(ray, key, filter.shape, PrimId(0), instance).map_or(-1.0, |hit| hit.t)
+}
+
+/// As [`intersect_cutout`] for one primitive of the [`Filter`] of a shape that has many.
+pub(super) unsafe extern "C" fn intersect_primitive(
+    filter: *const c_void,
+    prim: u32,
+    ray: *const sys::StRay,
+    key: u32,
+    instance: u32,
+) -> f32 {
+    // SAFETY: as in `intersect_cutout`.
+    let (filter, ray) = unsafe { (&*filter.cast::<Filter>(), &*ray.cast::<Ray>()) };
+    // SAFETY: the accelerator borrows the geometry.
+    let geometry = unsafe { filter.geometry() };
+    let instance = Filter::instance(geometry, instance);
+    geometry.intersect_prim(ray, key, filter.shape, PrimId(prim), instance).map_or(-1.0, |hit| hit.t)
+}
+
+/// Writes the bounds of one primitive of the [`Filter`] of a shape that has many.
+pub(super) unsafe extern "C" fn primitive_bounds(filter: *const c_void, prim: u32, lower: *mut f32, upper: *mut f32) {
+    // SAFETY: as in `intersect_cutout`; the shim passes room for three numbers each.
+    let (filter, lower, upper) =
+        unsafe { (&*filter.cast::<Filter>(), &mut *lower.cast::<[f32; 3]>(), &mut *upper.cast::<[f32; 3]>()) };
+    // SAFETY: the accelerator borrows the geometry.
+    let bounds = unsafe { filter.geometry() }.shape(filter.shape).prim_bounds(PrimId(prim));
+    (*lower, *upper) = (bounds.min.to_array(), bounds.max.to_array());
 }
 
 /// Whether a hit of a triangle of the [`Filter`] behind `user` counts.

@@ -4,7 +4,10 @@
 use std::ffi::c_void;
 use std::ptr::NonNull;
 
-use super::callbacks::{Filter, counts, enter_instance, intersect_cutout, intersect_placed, intersect_placed_packet};
+use super::callbacks::{
+    Filter, counts, enter_instance, intersect_cutout, intersect_placed, intersect_placed_packet, intersect_primitive,
+    primitive_bounds,
+};
 use super::device::Device;
 use super::{EmbreeOptions, EmbreeQuality, sys};
 use crate::error::{Error, Result};
@@ -20,6 +23,8 @@ pub(super) enum UserData {
     FilteredTriangles(sys::StFilter, #[allow(dead_code)] Box<Filter>),
     /// An analytic shape, with its own data where it has holes.
     Analytic(sys::StUserShape, #[allow(dead_code)] Option<Box<Filter>>),
+    /// Curves or points.
+    Primitives(sys::StUserPrimitives, #[allow(dead_code)] Box<Filter>),
 }
 
 /// The user data of every shape, by [`ShapeId`].
@@ -74,6 +79,16 @@ impl UserShapes {
                     };
                     UserData::Analytic(raw, filter)
                 }
+                (Shape::Curves(_) | Shape::Points(_), filter) => {
+                    let filter = filter.unwrap_or_else(|| Box::new(Filter::new(geometry, id)));
+                    let raw = sys::StUserPrimitives {
+                        shape: std::ptr::from_ref(&*filter).cast::<c_void>(),
+                        count: shape.prim_count() as u32,
+                        intersect: Some(intersect_primitive),
+                        bounds: Some(primitive_bounds),
+                    };
+                    UserData::Primitives(raw, filter)
+                }
             }
         };
         Self(geometry.shapes.iter().enumerate().map(of).collect())
@@ -84,7 +99,7 @@ impl UserShapes {
         let count = |of: fn(&UserData) -> bool| self.0.iter().filter(|data| of(data)).count();
         [
             count(|data| matches!(data, UserData::FilteredTriangles(..))),
-            count(|data| matches!(data, UserData::Analytic(..))),
+            count(|data| matches!(data, UserData::Analytic(..) | UserData::Primitives(..))),
         ]
     }
 
@@ -159,6 +174,11 @@ impl GeometryHandle {
             (Shape::Analytic(_), UserData::Analytic(user, _)) => {
                 // SAFETY: the device is alive; the caller keeps the user data alive.
                 let handle = unsafe { sys::st_new_user_geometry(device.handle(), user) };
+                Self::new(device, handle)
+            }
+            (Shape::Curves(_) | Shape::Points(_), UserData::Primitives(user, _)) => {
+                // SAFETY: the device is alive; the caller keeps the user data and the geometry alive.
+                let handle = unsafe { sys::st_new_user_primitives(device.handle(), user) };
                 Self::new(device, handle)
             }
             _ => Err(Error::Internal("user data of another shape".into())),

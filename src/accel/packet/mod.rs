@@ -62,13 +62,17 @@ fn is_quadric(shape: &Shape) -> bool {
             Analytic::Frustum(frustum) => frustum.radii()[0] == frustum.radii()[1],
             Analytic::Quad(_) | Analytic::Disk(_) | Analytic::Revolution(_) => false,
         },
-        Shape::Mesh(_) => false,
+        Shape::Mesh(_) | Shape::Curves(_) | Shape::Points(_) => false,
     }
 }
 
-/// Whether all shapes are in the world, at rest, and without holes.
+/// Whether all shapes are meshes or analytic, in the world, at rest, and without holes.
 fn is_static(geometry: &Geometry) -> bool {
-    let is_at_rest = |shape: &Shape| !matches!(shape, Shape::Mesh(mesh) if mesh.is_deforming());
+    let is_at_rest = |shape: &Shape| match shape {
+        Shape::Mesh(mesh) => !mesh.is_deforming(),
+        Shape::Analytic(_) => true,
+        Shape::Curves(_) | Shape::Points(_) => false,
+    };
     geometry.instances.is_empty() && geometry.cutouts.is_empty() && geometry.shapes.iter().all(is_at_rest)
 }
 

@@ -74,7 +74,7 @@ fn geometries(random: &mut Sequence) -> Vec<Geometry> {
 fn rays(random: &mut Sequence, geometry: &Geometry) -> Vec<Ray> {
     let corners: Vec<Vec3> = match &geometry.shapes[0] {
         Shape::Mesh(mesh) => mesh.positions().iter().map(|&p| Vec3::from_array(p)).collect(),
-        Shape::Analytic(_) => Vec::new(),
+        _ => Vec::new(),
     };
     let mut ray = || {
         let corner = corners[random.below(corners.len())];

@@ -58,7 +58,7 @@ impl Hierarchy<'_> {
     fn triangle(&self, prim: &PrimRecord) -> Option<TrianglePoints> {
         match self.geometry.shape(prim.shape) {
             Shape::Mesh(mesh) => Some(mesh.triangle_points(prim.id)),
-            Shape::Analytic(_) => None,
+            Shape::Analytic(_) | Shape::Curves(_) | Shape::Points(_) => None,
         }
     }
 
@@ -186,7 +186,7 @@ impl Hierarchy<'_> {
     pub fn exact_distance(&self, shape: ShapeId, ray: &Ray) -> Option<f32> {
         match self.geometry.shape(shape) {
             Shape::Analytic(placed) => placed.intersect(ray).map(|hit| hit.t as f32),
-            Shape::Mesh(_) => None,
+            Shape::Mesh(_) | Shape::Curves(_) | Shape::Points(_) => None,
         }
     }
 }

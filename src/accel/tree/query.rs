@@ -92,7 +92,7 @@ impl<'a, T: Tree, C: Counter, const ANY: bool> Query<'a, T, C, ANY> {
                             self.offer(Hit { t: h.t, u: h.u, v: h.v, shape, prim, instance: self.instance })
                         })
                     }
-                    Shape::Analytic(_) => {
+                    Shape::Analytic(_) | Shape::Curves(_) | Shape::Points(_) => {
                         let hit = self.accel.geometry().intersect_prim(&self.ray, self.key, shape, prim, self.instance);
                         hit.is_some_and(|hit| self.take(hit))
                     }

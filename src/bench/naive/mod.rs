@@ -78,7 +78,7 @@ impl<'g, T> Forest<'g, T> {
     fn new(geometry: &'g Geometry, name: &'static str, build: impl Fn(&Mesh) -> T) -> Self {
         let tree = |id: &ShapeId| match geometry.shape(*id) {
             Shape::Mesh(mesh) => Some((*id, build(mesh))),
-            Shape::Analytic(_) => None,
+            Shape::Analytic(_) | Shape::Curves(_) | Shape::Points(_) => None,
         };
         Self { geometry, trees: geometry.world.iter().filter_map(tree).collect(), name }
     }

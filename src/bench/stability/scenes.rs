@@ -7,7 +7,9 @@ use super::geometry::{
 use crate::accel::inspect::Inspect;
 use crate::accel::{self, AccelKind, Accelerator, Coherence, EmbreeInfo};
 use crate::bench::bumpy_sphere;
-use crate::geometry::{Geometry, Hit, Instance, Mesh, MeshStep, Object, Shape};
+use crate::geometry::{
+    CurveBasis, CurveKind, Curves, Geometry, Hit, Instance, Mesh, MeshStep, Object, Points, Shape, Strands,
+};
 use crate::id::{ObjectId, ShapeId};
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{Aabb, DAffine3, DMat3, DVec3, Motion, Ray, Transform};
@@ -156,7 +158,43 @@ pub fn scenes() -> Vec<(&'static str, Geometry)> {
         }))
     };
     scenes.push(("overlapping", world(vec![twice(), twice()])));
+    scenes.push(("curves", world(curves_of_all_kinds(&mut rng))));
+    scenes.push(("points", world(vec![points(&mut rng, 300), Shape::Mesh(soup(&mut rng, 50, 0.3))])));
     scenes
+}
+
+/// Strands of every basis and kind.
+fn curves_of_all_kinds(rng: &mut Rng) -> Vec<Shape> {
+    let all = [
+        (CurveBasis::BSpline, CurveKind::Round),
+        (CurveBasis::Linear, CurveKind::Round),
+        (CurveBasis::Bezier, CurveKind::Flat),
+        (CurveBasis::CatmullRom, CurveKind::Cylinder),
+    ];
+    all.iter().map(|&(basis, kind)| curves(rng, 40, basis, kind)).collect()
+}
+
+/// Strands of seven control points each.
+fn curves(rng: &mut Rng, count: usize, basis: CurveBasis, kind: CurveKind) -> Shape {
+    const POINTS: usize = 7;
+    let mut strands = Strands { points: Vec::new(), counts: vec![POINTS as u32; count] };
+    for _ in 0..count {
+        let (mut p, radius) = (0.8 * rng.cube(), rng.range(0.005, 0.03));
+        for i in 0..POINTS {
+            p += 0.15 * rng.cube();
+            strands.points.push([p.x as f32, p.y as f32, p.z as f32, (radius * (1.0 - 0.1 * i as f64)) as f32]);
+        }
+    }
+    Shape::Curves(Box::new(Curves::new(strands, basis, kind).expect("the strands are valid")))
+}
+
+/// Spheres of many sizes, some within others.
+fn points(rng: &mut Rng, count: usize) -> Shape {
+    let point = |rng: &mut Rng| {
+        let [x, y, z] = rng.cube().to_array().map(|x| x as f32);
+        [x, y, z, rng.magnitude(-3.0, -0.5) as f32]
+    };
+    Shape::Points(Box::new(Points::new((0..count).map(|_| point(rng)).collect()).expect("the points are valid")))
 }
 
 fn place(rng: &mut Rng, reach: f64) -> DAffine3 {

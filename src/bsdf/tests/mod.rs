@@ -4,6 +4,7 @@ mod beckmann;
 mod coated;
 mod diffuse;
 mod energy;
+mod hair;
 mod limits;
 mod microfacet;
 mod phase;

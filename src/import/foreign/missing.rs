@@ -31,9 +31,13 @@ impl Imported {
         };
 
         let mut is_whole = |place: &str, shape: &ShapeDesc| {
-            let ShapeDesc::Mesh(mesh) = shape else { return true };
-            let missing = files(mesh).find(|file| is_missing(file));
-            missing.inspect(|file| report(place, "shape mesh", file)).is_none()
+            let (kind, missing) = match shape {
+                ShapeDesc::Mesh(mesh) => ("shape mesh", files(mesh).find(|file| is_missing(file))),
+                ShapeDesc::Curves(curves) => ("shape curves", curves.file.as_deref().filter(|file| is_missing(file))),
+                ShapeDesc::Points(points) => ("shape points", points.file.as_deref().filter(|file| is_missing(file))),
+                _ => return true,
+            };
+            missing.inspect(|file| report(place, kind, file)).is_none()
         };
         retain("shapes", &mut self.desc.shapes, places, &mut is_whole);
         for (name, object) in &mut self.desc.objects {

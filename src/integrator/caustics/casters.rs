@@ -5,7 +5,7 @@ use crate::geometry::{Geometry, Hit, Shape, SpawnPoint, SurfacePoint};
 use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::integrator::world::has_part;
 use crate::light::{placed_area, triangle_error};
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 use crate::sampling::{AliasTable, warp};
 use crate::scene::Scene;
 
@@ -80,6 +80,11 @@ impl CausticCasters {
                 let point = SpawnPoint { p, n, error: placed.error() };
                 CausticPoint { shape, point, pdf_area: pmf * pdf_area }
             }
+            // Never chosen: they count no area.
+            Shape::Curves(_) | Shape::Points(_) => {
+                let point = SpawnPoint { p: DVec3::ZERO, n: Vec3::ZERO, error: 0.0 };
+                CausticPoint { shape, point, pdf_area: 0.0 }
+            }
         }
     }
 }
@@ -89,5 +94,6 @@ fn area(geometry: &Geometry, shape: ShapeId, prim: PrimId) -> f64 {
     match geometry.shape(shape) {
         Shape::Mesh(mesh) => mesh.triangle_points(prim).area(),
         Shape::Analytic(placed) => placed_area(placed),
+        Shape::Curves(_) | Shape::Points(_) => 0.0,
     }
 }

@@ -165,6 +165,8 @@ impl AreaLight {
             // Through the holes of a sphere its far side is seen, which only sampling by area finds.
             Shape::Analytic(placed) if emission.opacity.is_some() => EmitterShape::by_area(placed),
             Shape::Analytic(placed) => EmitterShape::analytic(placed),
+            // They do not emit.
+            Shape::Curves(_) | Shape::Points(_) => EmitterShape::Triangle { area: 0.0 },
         };
         let mut luminance = emission.radiance.luminance();
         if !emission.is_even() {
@@ -258,7 +260,7 @@ impl AreaLight {
     fn triangle(&self, geometry: &Geometry) -> Option<TriangleEmitter> {
         match geometry.shape(self.shape) {
             Shape::Mesh(mesh) => Some(TriangleEmitter::new(&mesh.triangle_points(self.prim))),
-            Shape::Analytic(_) => None,
+            Shape::Analytic(_) | Shape::Curves(_) | Shape::Points(_) => None,
         }
     }
 

@@ -25,6 +25,7 @@ pub(super) fn point(shape: &Shape, prim: PrimId, p: DVec3, u: [f32; 2]) -> Footp
             Footprint { attributes: mesh.attributes_at(prim, b, c), ..Footprint::point(mesh.uv(prim, b, c)) }
         }
         Shape::Analytic(placed) => Footprint::point(placed.uv(p, u)),
+        Shape::Curves(_) | Shape::Points(_) => Footprint::point(Vec2::ZERO),
     }
 }
 
@@ -35,7 +36,7 @@ pub(super) fn mean(shape: &Shape, prim: PrimId, function: impl Fn(&Footprint) ->
     let at = |i: usize| {
         let u = [middle(i % side), middle(i / side)];
         let p = match shape {
-            Shape::Mesh(_) => DVec3::ZERO,
+            Shape::Mesh(_) | Shape::Curves(_) | Shape::Points(_) => DVec3::ZERO,
             Shape::Analytic(placed) => placed.sample_area(u).p,
         };
         function(&point(shape, prim, p, u))

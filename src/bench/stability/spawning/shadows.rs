@@ -51,6 +51,7 @@ fn mapped(shape: &Shape, map: DAffine3) -> Shape {
             let map = Transform::new(map * placed.transform.world_from_object).expect("the map is regular");
             Shape::Analytic(TransformedShape::new(placed.shape.clone(), map))
         }
+        Shape::Curves(_) | Shape::Points(_) => unreachable!("emitters are meshes or analytic"),
     }
 }
 

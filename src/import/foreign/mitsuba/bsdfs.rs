@@ -167,6 +167,7 @@ impl<'a> Reader<'a> {
                 (MaterialDesc::Plastic(Box::new(plastic)), true)
             }
             "principled" => self.principled(element, uv)?,
+            "hair" => (self.hair(element, uv)?, false),
             _ => {
                 element.ignored("", "unsupported BSDF: a grey diffuse surface in its place");
                 (MaterialDesc::Diffuse { albedo: ColorDesc::Grey(0.5), roughness: ScalarDesc::Constant(0.0) }, true)
@@ -384,7 +385,7 @@ impl<'a> Reader<'a> {
 }
 
 /// The index of the inside over that of the outside.
-fn relative_index(element: &mut Element, inside: &str) -> Result<f32> {
+pub(super) fn relative_index(element: &mut Element, inside: &str) -> Result<f32> {
     debug_assert!(names::index(inside).is_ok());
     Ok((element.index("int_ior", inside)? / element.index("ext_ior", "air")?) as f32)
 }

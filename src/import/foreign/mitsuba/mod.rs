@@ -5,6 +5,7 @@
 //! scatter twice between their microfacets is lost.
 
 mod bsdfs;
+mod curves;
 mod element;
 mod emitters;
 mod integrators;

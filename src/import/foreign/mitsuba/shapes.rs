@@ -157,6 +157,11 @@ impl<'a> Reader<'a> {
         *common.opacity = opacity.filter(|opacity| !matches!(opacity, OpacityDesc::Number(v) if *v >= 1.0));
         *common.emission = emission;
         *common.reverse_normal = flipped != reversed;
+        if let ShapeDesc::Curves(curves) = &mut shape
+            && (std::mem::take(&mut curves.reverse_normal) || curves.emission.take().is_some())
+        {
+            element.ignored("", "curves have no other side and emit no light");
+        }
         element.finish(&mut self.draft);
         Ok(Some((place, shape)))
     }
@@ -240,6 +245,10 @@ impl<'a> Reader<'a> {
                 let frame = DAffine3 { matrix3: DMat3::from_cols(x, y, z), translation: p0 };
                 let cylinder = CylinderDesc::new(radius.abs(), axis.length(), 360.0);
                 form(ShapeDesc::Cylinder(cylinder), element.transform("to_world")? * frame, UvOrigin::Mitsuba)
+            }
+            "bsplinecurve" | "linearcurve" => {
+                let curves = self.curves(element)?;
+                form(ShapeDesc::Curves(curves), element.transform("to_world")?, UvOrigin::Mitsuba)
             }
             _ => return Ok(None),
         }))

@@ -7,6 +7,7 @@ use std::rc::Rc;
 use super::area_light::AreaLight;
 use super::camera::{self, CameraDirective};
 use super::colors::{ColorSpace, Colors};
+use super::curves::{joined, push};
 use super::lights::Lights;
 use super::materials::Materials;
 use super::media::{MediumDirective, MediumInterface, MediumTable};
@@ -478,9 +479,10 @@ impl Reader {
             Directive { kind: &kind, params: &params },
             &self.graphics,
         )?;
-        let Some(shape) = read else { return Ok(()) };
+        let Some(mut shape) = read else { return Ok(()) };
         match &mut self.object {
-            Some(object) => object.shapes.push((params.place, shape)),
+            Some(object) => push(&mut object.shapes, params.place, shape),
+            None if joined(self.draft.desc.shapes.last_mut(), &mut shape) => {}
             None => self.draft.add_shape(&params.place, shape),
         }
         Ok(())

@@ -4,8 +4,9 @@ use super::colors::{Colors, Meaning};
 use super::params::Params;
 use super::textures::{Texture, Textures};
 use crate::desc::{
-    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, PlasticDesc,
-    RangedDesc, RoughnessDesc, TextureDesc, TextureFilterDesc, WrapDesc,
+    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, DistributionDesc, HairDesc, HairIor, HairRoughness,
+    HairTilt, MaterialDesc, NormalMapDesc, PlasticDesc, RangedDesc, RoughnessDesc, TextureDesc, TextureFilterDesc,
+    WrapDesc,
 };
 use crate::error::Result;
 use crate::import::foreign::Draft;
@@ -109,11 +110,35 @@ impl Materials<'_> {
     }
 
     fn hair(&mut self, params: &Params) -> Result<MaterialDesc> {
-        self.draft.approximated(&params.place, &params.element, "", "diffuse");
-        let brown = Texture::Constant([0.2, 0.1, 0.05]);
-        let color =
-            self.textures.get(params, &self.colors, "reflectance", Meaning::Reflectance, false)?.unwrap_or(brown);
-        Ok(MaterialDesc::Diffuse { albedo: color.color(self.draft, &params.place), roughness: zero() })
+        let number = |name: &str, default: f32| -> Result<f32> {
+            Ok(match self.textures.get(params, &self.colors, name, Meaning::Number, true)? {
+                Some(Texture::Constant([value, ..])) => value,
+                Some(Texture::Named { .. }) => {
+                    params.approximate(name, "the default, for it can have no texture");
+                    default
+                }
+                None => default,
+            })
+        };
+        let mut hair = HairDesc {
+            longitudinal_roughness: HairRoughness(number("beta_m", 0.3)?.clamp(0.0, 1.0)),
+            azimuthal_roughness: HairRoughness(number("beta_n", 0.3)?.clamp(0.0, 1.0)),
+            scale_tilt_degrees: HairTilt(number("alpha", 2.0)?.clamp(-45.0, 45.0)),
+            ior: HairIor(number("eta", 1.55)?.clamp(1.0 + 1e-4, 10.0)),
+            ..HairDesc::default()
+        };
+        let pigments = [number("eumelanin", 0.0)?.max(0.0), number("pheomelanin", 0.0)?.max(0.0)];
+        let has_pigments = params.has("eumelanin") || params.has("pheomelanin");
+        let color = ["reflectance", "color"].into_iter().find(|name| params.has(name));
+        // In the order of pbrt.
+        match self.textures.get(params, &self.colors, "sigma_a", Meaning::Number, false)? {
+            Some(Texture::Constant(sigma_a)) => hair.sigma_a = Some(sigma_a.map(|sigma| sigma.max(0.0))),
+            Some(Texture::Named { .. }) => params.approximate("sigma_a", "brown hair, for it can have no texture"),
+            None if let Some(name) = color => hair.color = Some(self.color(params, name, 0.5)?),
+            None if has_pigments => [hair.eumelanin, hair.pheomelanin] = pigments.map(Some),
+            None => {}
+        }
+        Ok(MaterialDesc::Hair(Box::new(hair)))
     }
 
     fn coated_conductor(&mut self, name: &str, params: &Params) -> Result<MaterialDesc> {

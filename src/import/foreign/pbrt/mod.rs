@@ -4,6 +4,7 @@ mod area_light;
 mod bilinear;
 mod camera;
 mod colors;
+mod curves;
 mod directives;
 mod lights;
 mod loop_subdivision;

@@ -6,6 +6,7 @@ use std::path::Path;
 use super::area_light::{AreaLight, Extent};
 use super::bilinear::Patches;
 use super::colors::Colors;
+use super::curves::curve;
 use super::loop_subdivision;
 use super::media::MediumTable;
 use super::params::Params;
@@ -14,8 +15,8 @@ use super::textures::Textures;
 use super::triangles;
 use crate::assets::{MeshData, read_ply_attributes};
 use crate::desc::{
-    CylinderDesc, DiskDesc, MaterialDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc, ShapeDesc, SmoothByDesc,
-    SphereDesc,
+    CurvesDesc, CylinderDesc, DiskDesc, MaterialDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc, ShapeDesc,
+    SmoothByDesc, SphereDesc,
 };
 use crate::error::Result;
 use crate::import::foreign::Draft;
@@ -55,6 +56,14 @@ enum Form {
     Mesh(MeshData, usize),
     /// Triangles of a file that can stay there.
     File(String),
+    /// A curve.
+    Curves(CurvesDesc),
+}
+
+/// Reports that curves emit no light; false.
+fn no_light(draft: &mut Draft, params: &Params) -> bool {
+    draft.ignored(&params.place, &params.element, "AreaLightSource", "curves emit no light");
+    false
 }
 
 /// The transforms of a shape; what emits light does not move.
@@ -135,6 +144,10 @@ impl Shapes<'_> {
                 (self.mesh_shape(draft, kind, mesh), DAffine3::IDENTITY, Some(extent))
             }
             Form::File(file) => (ShapeDesc::Mesh(MeshDesc::from_file(file)), DAffine3::IDENTITY, None),
+            Form::Curves(curves) => {
+                (reverse, light) = (false, light.filter(|_| no_light(draft, params)));
+                (ShapeDesc::Curves(curves), DAffine3::IDENTITY, None)
+            }
         };
         let ctm = still_if_lit(draft, params, graphics.ctm, light.is_some());
         let common = shape.common_mut();
@@ -197,6 +210,7 @@ impl Shapes<'_> {
                 }
                 return Ok(form);
             }
+            "curve" => return Ok(Some(Form::Curves(curve(params)?))),
             "plymesh" => return self.ply(params, needs).map(Some),
             "trianglemesh" => triangle_mesh(params)?,
             "bilinearmesh" => {
@@ -214,10 +228,6 @@ impl Shapes<'_> {
                     params.approximate("levels", "fewer, for there would be too many triangles");
                 }
                 loop_subdivision::subdivide(&positions, &indices, levels).map_err(|message| params.error(message))?
-            }
-            "curve" => {
-                draft.ignored(&params.place, &params.element, "", "curves are unsupported");
-                return Ok(None);
             }
             other => return Err(params.error(format!("unknown shape \"{other}\""))),
         };

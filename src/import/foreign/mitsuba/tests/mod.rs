@@ -1,5 +1,6 @@
 //! Small scenes, one for each meaning that is easy to get wrong.
 
+mod curves;
 mod lights;
 mod materials;
 mod media;

@@ -91,7 +91,7 @@ fn spectra_come_from_files() {
 fn the_report_lists_the_outcome_of_each_parameter() {
     let imported = world(
         "Material \"coateddiffuse\" \"rgb reflectance\" [1 2 0.5] \"float thickness\" 0.1 \"float madeup\" 1
-         Shape \"sphere\" \"float radius\" 2 Shape \"curve\"
+         Shape \"sphere\" \"float radius\" 2 Shape \"disk\" \"float radius\" 0
          Shape \"plymesh\" \"string filename\" \"a.ply\" \"float edgelength\" 1",
     );
     assert_eq!(outcome(&imported, "Shape sphere", "radius"), Outcome::Mapped);
@@ -99,7 +99,7 @@ fn the_report_lists_the_outcome_of_each_parameter() {
     assert_eq!(outcome(&imported, "Material", "thickness"), Outcome::Ignored);
     assert_eq!(outcome(&imported, "Material", "madeup"), Outcome::Ignored);
     assert_eq!(outcome(&imported, "Material", ""), Outcome::Approximated);
-    assert_eq!(outcome(&imported, "Shape curve", ""), Outcome::Ignored);
+    assert_eq!(outcome(&imported, "Shape disk", ""), Outcome::Ignored);
     assert_eq!(outcome(&imported, "Shape plymesh", "edgelength"), Outcome::Ignored);
     assert!(imported.places.values().any(|place| place == "s.pbrt:3:10"), "{:?}", imported.places);
 }

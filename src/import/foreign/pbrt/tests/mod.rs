@@ -1,5 +1,6 @@
 //! The reader as a whole.
 
+mod curves;
 mod errors;
 mod materials;
 mod media;
