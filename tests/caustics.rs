@@ -194,20 +194,20 @@ fn what_photons_cannot_do_is_refused() {
     let refusal = |scene: &Value, overrides: &Overrides| {
         let desc = serde_json::from_value(scene.clone()).unwrap();
         match render::Settings::new(&desc, overrides) {
-            Err(Error::Usage(message)) => message,
+            Err(Error::Setting { message, .. }) => message,
             other => panic!("{other:?}"),
         }
     };
     let on = Overrides { caustics: Some(CausticsDesc::Photons), ..Overrides::default() };
     for (overrides, option) in [
-        (Overrides { target_error: Some(0.01), ..on.clone() }, "--target-error"),
-        (Overrides { guiding: Some(true), ..on.clone() }, "--guiding on"),
-        (Overrides { regularize: Some(0.1), ..on.clone() }, "--regularize"),
+        (Overrides { target_error: Some(0.01), ..on.clone() }, "`target_error`"),
+        (Overrides { guiding: Some(true), ..on.clone() }, "`guiding`"),
+        (Overrides { regularize: Some(0.1), ..on.clone() }, "`regularize`"),
     ] {
         let message = refusal(&balls(), &overrides);
-        assert!(message.starts_with("--caustics photons") && message.contains(option), "{message}");
+        assert!(message.starts_with("`caustics` photons") && message.contains(option), "{message}");
     }
     let mut normals = balls();
     normals["integrator"] = json!({ "type": "normal" });
-    assert!(refusal(&normals, &on).starts_with("--caustics"));
+    assert!(refusal(&normals, &on).starts_with("`caustics`"));
 }

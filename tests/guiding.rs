@@ -172,19 +172,19 @@ fn what_guiding_cannot_do_is_refused() {
     let refusal = |scene: &Value, overrides: &Overrides| {
         let desc = serde_json::from_value(scene.clone()).unwrap();
         match render::Settings::new(&desc, overrides) {
-            Err(Error::Usage(message)) => message,
+            Err(Error::Setting { message, .. }) => message,
             other => panic!("{other:?}"),
         }
     };
     let on = Overrides { guiding: Some(true), ..Overrides::default() };
-    assert!(refusal(&room(), &Overrides { target_error: Some(0.01), ..on.clone() }).starts_with("--target-error"));
+    assert!(refusal(&room(), &Overrides { target_error: Some(0.01), ..on.clone() }).starts_with("`target_error`"));
     let mut normals = room();
     normals["integrator"] = json!({ "type": "normal" });
-    assert!(refusal(&normals, &on).starts_with("--guiding"));
+    assert!(refusal(&normals, &on).starts_with("`guiding`"));
     let prepared = prepare(&room(), &on);
     let accel = accel::build(AccelKind::EMBREE, &prepared.scene.geometry, 1).unwrap();
     let error = render::replay(&prepared.scene, &*accel, &prepared.settings, [1, 1], 0).unwrap_err();
-    assert!(error.to_string().contains("--guiding off"), "{error}");
+    assert!(error.to_string().contains("`guiding`"), "{error}");
 }
 
 fn kit(scene: &Value, spp: u32) -> Kit {

@@ -119,6 +119,6 @@ fn the_option_replaces_what_the_scene_says() {
     assert_eq!(of(Some(RouletteDesc::Off)).0, RouletteDesc::Off);
     let mut whitted = room();
     whitted["integrator"] = json!({ "type": "whitted" });
-    assert!(matches!(settings(&whitted, Some(RouletteDesc::Auto)), Err(Error::Usage(message))
-        if message.starts_with("--roulette")));
+    assert!(matches!(settings(&whitted, Some(RouletteDesc::Auto)), Err(Error::Setting { message, .. })
+        if message.starts_with("`roulette`")));
 }
