@@ -61,7 +61,7 @@ fn white_hair_in_a_furnace_cannot_be_seen() {
 fn a_straight_curve_looks_like_a_cylinder() {
     let scene = |shape: Value| {
         probe(
-            [0.3, 2.0, 3.0],
+            [0.3, 0.5, 3.0],
             [0.0, 0.5, 0.0],
             json!({
                 "film": { "width": 48, "height": 48, "filter": { "type": "box" } },
@@ -76,13 +76,13 @@ fn a_straight_curve_looks_like_a_cylinder() {
     };
     let curve = scene(json!({ "type": "curves", "material": "red", "basis": "linear",
         "strands": [[[0, -0.3, 0, 0.2], [0, 0.4, 0, 0.2], [0, 1.2, 0, 0.2]]] }));
-    // The cylinder has an inside, which is behind the front for all rays here but those through its upper end.
+    // The cylinder has an inside, which is behind the front for all rays here.
     let cylinder = scene(json!({ "type": "cylinder", "material": "red", "radius": 0.2, "height": 1.5,
         "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": -90 } }, { "translate": [0, -0.3, 0] }] }));
     let (a, b) = (render(&curve), render(&cylinder));
     let differing = pixels(&a).zip(pixels(&b)).filter(|(a, b)| (a[0] - b[0]).abs() > 0.02 * b[0].max(0.05)).count();
     let lit = pixels(&a).filter(|pixel| pixel[0] > 0.1).count();
-    assert!(lit > 150 && differing * 10 < lit, "{differing} of {lit}");
+    assert!(lit > 150 && differing * 100 <= lit, "{differing} of {lit}");
 }
 
 #[test]

@@ -15,7 +15,7 @@ use crate::color::Rgb;
 use crate::math::random::Rng;
 use crate::math::{DAffine3, DVec3, Ray, RenderSpace, Vec3};
 
-/// Voxels along an edge of a block. Measured: 2 costs more steps, 8 more collisions.
+/// Voxels along an edge of a block: smaller ones cost more steps, larger ones more collisions.
 const BLOCK: usize = 4;
 
 /// The most blocks along an axis.
