@@ -25,15 +25,18 @@ const PICTURES: [(&str, &str); 2] = [("ShapeDesc", "shape"), ("MaterialDesc", "m
 /// Examples: `# TYPE VARIANT`, or `# TYPE`, and the lines below. They are what the pictures show.
 const EXAMPLES: &str = include_str!("examples.txt");
 
+const INTRODUCTION: &str = "\
+A scene is a JSON file. `//` and `/* */` comments are allowed, and commas behind the last entry; a list of one entry may
+be the entry alone. Unknown keys are errors. The world is right-handed, angles are in degrees, colours are linear Rec.709
+and paths are relative to the scene file.";
+
 /// All pages, of the schema.
 pub fn pages(schema: &Value) -> Vec<Page> {
     let none = Map::new();
     let definitions = schema["$defs"].as_object().unwrap_or(&none);
     let types = Types { definitions, homes: homes(definitions) };
     let scene = format!(
-        "# The scene file\n\n{}\n\nA scene is a JSON file. `//` and `/* */` comments are allowed, and commas behind the \
-         last entry; a list of one entry may be the entry alone. Unknown keys are errors. The world is right-handed, angles \
-         are in degrees, colours are linear Rec.709 and paths are relative to the scene file.\n\n{}",
+        "# The scene file\n\n{}\n\n{INTRODUCTION}\n\n{}",
         schema["description"].as_str().unwrap_or_default(),
         table(&types, schema, &BTreeSet::new(), "scene"),
     );

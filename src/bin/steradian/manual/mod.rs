@@ -5,9 +5,10 @@ mod format;
 mod words;
 
 use std::fs;
+use std::io::Write as _;
 use std::path::Path;
 
-use steradian::{Error, Result};
+use steradian::{Error, Result, output};
 
 pub use commands::pages as command_pages;
 pub use format::pages as format_pages;
@@ -24,11 +25,10 @@ pub struct Page {
 ///
 /// [`Error::Output`] for a file or folder that cannot be written.
 pub fn write(pages: &[Page], folder: &Path) -> Result<()> {
-    let failed = |file: &Path, e: std::io::Error| Error::Output { file: file.to_owned(), message: e.to_string() };
-    fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
+    fs::create_dir_all(folder).map_err(|e| Error::Output { file: folder.to_owned(), message: e.to_string() })?;
     for page in pages {
         let file = folder.join(&page.name);
-        fs::write(&file, &page.text).map_err(|e| failed(&file, e))?;
+        output::write_atomically(&file, |out| out.write_all(page.text.as_bytes()).map_err(|e| e.to_string()))?;
     }
     Ok(())
 }

@@ -54,7 +54,9 @@ impl Types<'_> {
         if let Some(choices) = value["anyOf"].as_array().or_else(|| value["oneOf"].as_array()) {
             let kinds: Vec<&Value> = choices.iter().filter(|choice| choice["type"] != "null").collect();
             return match kinds[..] {
-                [list, one] if list["items"] == *one && list["minItems"].is_null() => format!("{}, or a list", inner(one)),
+                [list, one] if list["items"] == *one && list["minItems"].is_null() => {
+                    format!("{}, or a list", inner(one))
+                }
                 _ => kinds.iter().map(|kind| inner(kind)).collect::<Vec<_>>().join(" or "),
             };
         }
