@@ -27,8 +27,8 @@ const EXAMPLES: &str = include_str!("examples.txt");
 
 const INTRODUCTION: &str = "\
 A scene is a JSON file. `//` and `/* */` comments are allowed, and commas behind the last entry; a list of one entry may
-be the entry alone. Unknown keys are errors. The world is right-handed, angles are in degrees, colours are linear Rec.709
-and paths are relative to the scene file.";
+be the entry alone. Unknown keys are errors. The world is right-handed, angles are in degrees, colours are linear
+Rec.709 and paths are relative to the scene file.";
 
 /// All pages, of the schema.
 pub fn pages(schema: &Value) -> Vec<Page> {
