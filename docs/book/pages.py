@@ -27,7 +27,8 @@ def address(target, chapter_path):
         return target
     file = normpath(f"{PurePosixPath(file_of(chapter_path)).parent}/{path}")
     if file.startswith(SRC):
-        inside = file[len(SRC):]
+        # mdBook turns README.md into the index of its folder.
+        inside = re.sub(r"(^|/)README\.md$", r"\1index.md", file[len(SRC):])
     elif re.fullmatch(r"docs/[^/]+\.md", file):
         inside = file
     else:
