@@ -19,6 +19,8 @@ mod bench_error;
 mod bench_scale;
 /// The catalogue of checks from the command line.
 mod bench_stability;
+/// The book: its pages, scenes and links.
+mod book;
 /// What the cameras of the scene file see.
 mod cameras;
 /// Light that mirrors and glass throw on other surfaces, by photons.

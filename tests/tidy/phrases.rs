@@ -59,7 +59,8 @@ fn messages_and_help_are_in_plain_words() {
 #[test]
 fn documents_are_in_plain_words() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let docs = fs::read_dir(root.join("docs")).unwrap().map(|entry| entry.unwrap().path());
+    let folders = ["docs", "docs/book/src"].map(|folder| fs::read_dir(root.join(folder)).unwrap());
+    let docs = folders.into_iter().flatten().map(|entry| entry.unwrap().path());
     let documents = docs.chain(DOCUMENTS.map(|name| root.join(name))).filter(|path| path.extension().is_some());
     let mut faults = Vec::new();
     let mut read = 0;

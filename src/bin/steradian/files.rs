@@ -79,7 +79,7 @@ impl<'a> NamedFiles<'a> {
             Command::Bench(command) => self.add_bench(command),
             #[cfg(not(feature = "bench"))]
             Command::Bench { .. } => {}
-            Command::Schema | Command::Man { .. } | Command::Completions { .. } => {}
+            Command::Schema { .. } | Command::Man { .. } | Command::Completions { .. } => {}
         }
     }
 

@@ -19,6 +19,7 @@ mod info;
 mod interrupt;
 mod kept;
 mod log;
+mod manual;
 mod memory;
 mod merge;
 mod names;
@@ -33,6 +34,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use clap::CommandFactory;
+use steradian::desc::SceneDesc;
 use steradian::output::FileUses;
 use steradian::{Error, ErrorKind, Result, import};
 
@@ -87,8 +89,14 @@ fn run(cli: Cli, uses: FileUses) -> Result<u8> {
         Command::Convert(arguments) => convert::run(&arguments, uses).map(|()| 0),
         Command::Farm(command) => farm::run(&command, uses).map(|()| 0),
         Command::Config(ConfigCommand::Show(arguments)) => config::show(&arguments).map(|()| 0),
-        Command::Man { dir } => man(dir.as_deref()).map(|()| 0),
-        Command::Schema => text::print_as_it_is(&import::schema()).map(|()| 0),
+        Command::Man { markdown: Some(folder), .. } => {
+            manual::write(&manual::command_pages(args::command_line()), &folder).map(|()| 0)
+        }
+        Command::Man { dir, markdown: None } => man(dir.as_deref()).map(|()| 0),
+        Command::Schema { markdown: Some(folder) } => {
+            manual::write(&manual::format_pages(schemars::schema_for!(SceneDesc).as_value()), &folder).map(|()| 0)
+        }
+        Command::Schema { markdown: None } => text::print_as_it_is(&import::schema()).map(|()| 0),
         Command::Merge(arguments) => merge::run(&arguments, uses).map(|()| 0),
         Command::CheckExr(arguments) => check_exr::run(&arguments),
         Command::Rerender(arguments) => rerender::run(&arguments, uses),

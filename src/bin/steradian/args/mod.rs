@@ -111,7 +111,11 @@ pub enum Command {
     ///
     /// Editors check and complete scenes with it: save it and name it in the scene's "$schema".
     #[command(after_help = "Example:\n  steradian schema > scene.schema.json")]
-    Schema,
+    Schema {
+        /// Write the manual of the scene format as Markdown pages into this folder instead
+        #[arg(long, value_name = "DIR")]
+        markdown: Option<PathBuf>,
+    },
     /// Merge shards into the picture
     ///
     /// Shards are what `render --shard` writes. All of them together are the picture of one run bit for bit, in every
@@ -168,6 +172,9 @@ pub enum Command {
         /// The folder.
         #[arg(long, value_name = "DIR")]
         dir: Option<PathBuf>,
+        /// Write the reference of all commands as Markdown pages into this folder instead
+        #[arg(long, value_name = "DIR", conflicts_with = "dir")]
+        markdown: Option<PathBuf>,
     },
     /// Print completions for a shell
     #[command(

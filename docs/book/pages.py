@@ -1,0 +1,71 @@
+#!/usr/bin/env python3
+"""A preprocessor of mdBook: adds every docs/*.md as a chapter, and makes relative links lead to chapters or to the repository."""
+
+import json
+import re
+import sys
+from pathlib import Path, PurePosixPath
+from posixpath import normpath, relpath
+
+ROOT = Path(__file__).resolve().parents[2]
+REPOSITORY = "https://github.com/steradian-renderer/steradian/blob/main/"
+SRC = "docs/book/src/"
+# Documents for developers; all others are for users.
+DEVELOPERS = ["accelerators", "agreement", "dependencies", "flaws", "numerics", "performance", "releasing", "wavefront"]
+
+
+def file_of(chapter_path):
+    """The file in the repository of a chapter."""
+    inside = PurePosixPath(chapter_path)
+    return f"docs/{inside.name}" if inside.parts[0] == "docs" else SRC + chapter_path
+
+
+def address(target, chapter_path):
+    """A link as the book needs it."""
+    path, mark, anchor = target.partition("#")
+    if not path or "://" in path or path.startswith("mailto:"):
+        return target
+    file = normpath(f"{PurePosixPath(file_of(chapter_path)).parent}/{path}")
+    if file.startswith(SRC):
+        # mdBook turns README.md into the index of its folder.
+        inside = re.sub(r"(^|/)README\.md$", r"\1index.md", file[len(SRC):])
+    elif re.fullmatch(r"docs/[^/]+\.md", file):
+        inside = file
+    else:
+        return REPOSITORY + file + mark + anchor
+    return relpath(inside, PurePosixPath(chapter_path).parent.as_posix()) + mark + anchor
+
+
+def adjust(chapter):
+    path = chapter["path"]
+    if path:
+        chapter["content"] = re.sub(
+            r"\]\(([^)\s]+)\)", lambda link: f"]({address(link[1], path)})", chapter["content"]
+        )
+    for item in chapter["sub_items"]:
+        if "Chapter" in item:
+            adjust(item["Chapter"])
+
+
+def document(file):
+    text = file.read_text()
+    title = re.search(r"^# (.*)$", text, re.M)
+    path = f"docs/{file.name}"
+    return {"Chapter": {
+        "name": title[1] if title else file.stem, "content": text, "number": None, "sub_items": [], "path": path,
+        "source_path": path, "parent_names": [],
+    }}
+
+
+if len(sys.argv) > 1 and sys.argv[1] == "supports":
+    sys.exit(0)
+_, book = json.load(sys.stdin)
+items = book.get("items", book.get("sections"))
+files = sorted((ROOT / "docs").glob("*.md"))
+for part, of_developers in [("Topics", False), ("Figures and inside", True)]:
+    items.append({"PartTitle": part})
+    items += [document(file) for file in files if (file.stem in DEVELOPERS) == of_developers]
+for item in items:
+    if "Chapter" in item:
+        adjust(item["Chapter"])
+json.dump(book, sys.stdout)
