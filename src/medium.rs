@@ -11,7 +11,7 @@ mod volume;
 mod voxels;
 
 pub use noise::Noise;
-pub use volume::{Coefficients, ExtinctionSplit, Flight, Tracked, Volume, VolumeGrids};
+pub use volume::{Coefficients, ExtinctionSplit, FreeFlight, Tracked, Volume, VolumeGrids};
 pub use voxels::{Border, VoxelGrid};
 
 use std::cmp::Ordering;

@@ -4,43 +4,22 @@ use serde_json::{Value, json};
 use steradian::ErrorKind;
 use steradian::accel::AccelKind;
 use steradian::assets::{VolumeData, vol_bytes};
-use steradian::film::Image;
 use steradian::render::Overrides;
 
 use crate::bad_input::assert_error;
-use crate::participating_media::{foggy, hg, integral};
+use crate::participating_media::{self, assert_means, foggy, hg, integral};
 use crate::util::folder::{Folder, good_scene, set};
-use crate::util::render::{
-    AssertIs, Estimate, assert_blocks_agree, block_means, merge, prepare, probe, render, render_with,
-};
+use crate::util::render::{Estimate, assert_blocks_agree, block_means, merge, prepare, probe, render, render_with};
 
-/// A ball of a medium around the origin under a white sky, seen from far away; the medium's box is around the ball.
+/// A ball of a medium whose box is around it.
 fn ball(medium: &Value) -> Value {
-    let mut scene = probe(
-        [0.3, 0.2, 5.0],
-        [0.3, 0.2, 0.0],
-        json!({
-            "integrator": { "type": "path", "max_depth": 100_000 },
-            "sampler": { "spp": 64 },
-            "media": { "cloud": medium },
-            "materials": { "cloud": { "type": "dielectric", "ior": 1, "medium": "cloud" } },
-            "shapes": [{ "type": "sphere", "material": "cloud" }],
-            "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
-        }),
-    );
+    let mut scene = participating_media::ball(medium);
     scene["media"]["cloud"]["volume"]["bounds"] = json!([[-1, -1, -1], [1, 1, 1]]);
     scene
 }
 
 fn noise(seed: u32) -> Value {
     json!({ "type": "noise", "resolution": [20, 17, 24], "frequency": [2, 3, 2], "seed": seed, "base": 0.4 })
-}
-
-#[track_caller]
-fn assert_means(image: &Image, expected: [f64; 3], what: &str) {
-    for (channel, expected) in expected.into_iter().enumerate() {
-        Estimate::of(image, channel).assert_is(expected, &format!("{what}, channel {channel}"));
-    }
 }
 
 #[test]

@@ -20,7 +20,7 @@ fn henyey_greenstein(g: f64) -> Value {
 }
 
 /// A ball of a medium around the origin under a white sky, seen from far away.
-fn ball(medium: &Value) -> Value {
+pub fn ball(medium: &Value) -> Value {
     probe(
         [0.3, 0.2, 5.0],
         [0.3, 0.2, 0.0],
@@ -36,7 +36,7 @@ fn ball(medium: &Value) -> Value {
 }
 
 #[track_caller]
-fn assert_means(image: &Image, expected: [f64; 3], what: &str) {
+pub fn assert_means(image: &Image, expected: [f64; 3], what: &str) {
     for (channel, expected) in expected.into_iter().enumerate() {
         Estimate::of(image, channel).assert_is(expected, &format!("{what}, channel {channel}"));
     }

@@ -214,7 +214,7 @@ impl PyImage {
     }
 }
 
-/// A picture out of what stands for one: an Image, an array of shape (height, width, 3 or 4), or the name of an .exr
+/// A picture: an Image, an array of shape (height, width, 3 or 4), or the name of an .exr
 /// file.
 fn image_of(value: &Bound<'_, PyAny>) -> PyResult<Arc<Source>> {
     if let Ok(image) = value.cast::<PyImage>() {

@@ -85,7 +85,7 @@ fn assignments(settings: &mut Map<String, Value>) -> steradian::Result<Vec<Assig
 }
 
 fn overrides(py: Python<'_>, mut settings: Map<String, Value>) -> PyResult<Overrides> {
-    // The name of an algorithm stands for it with its default parameters.
+    // The name of an algorithm alone means its default parameters.
     if let Some(Value::String(name)) = settings.get("integrator") {
         let tagged = serde_json::json!({ "type": name });
         settings.insert("integrator".to_owned(), tagged);

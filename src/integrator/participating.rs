@@ -9,9 +9,9 @@ use super::media::{MAX_SURFACES, MediaState};
 use crate::color::Rgb;
 use crate::geometry::{Hit, SpawnPoint};
 use crate::id::{MediumId, PrimId, ShapeId};
-use crate::light::Way;
+use crate::light::RaySegment;
 use crate::math::{Ray, Rng};
-use crate::medium::{Flight, Medium, RelativeIor, transmittance};
+use crate::medium::{FreeFlight, Medium, RelativeIor, transmittance};
 
 /// What a path's ray meets first of media that scatter and of surfaces that are no mere boundaries within one medium.
 pub(super) struct MediumPath {
@@ -34,7 +34,7 @@ pub(super) struct MediumPath {
 pub(super) struct FirstSegment {
     pub medium: MediumId,
     /// To its first boundary or surface.
-    pub way: Way,
+    pub way: RaySegment,
     /// The share of each channel in the choice of one.
     shares: [f32; 3],
 }
@@ -62,7 +62,7 @@ pub(super) struct DistanceSample {
     shares: [f32; 3],
     channel: usize,
     /// With the optical depth in that channel.
-    flight: Flight,
+    flight: FreeFlight,
     /// The path's throughput.
     carried: Rgb,
 }
@@ -76,7 +76,7 @@ impl DistanceSample {
         // Rounding must not choose a channel of no share.
         let last = if shares[2] > 0.0 { 2 } else { usize::from(shares[1] > 0.0) };
         let channel = if u[0] < shares[0] { 0 } else { last.min(if u[0] < shares[0] + shares[1] { 1 } else { 2 }) };
-        Self { shares, channel, flight: Flight::new(u[1], random), carried: throughput }
+        Self { shares, channel, flight: FreeFlight::new(u[1], random), carried: throughput }
     }
 }
 
@@ -170,7 +170,7 @@ impl World<'_> {
             return None;
         }
         let (direction, length) = (ray.direction, ray.direction.length());
-        let way = Way {
+        let way = RaySegment {
             origin: ray.origin.as_dvec3() + direction.as_dvec3() * f64::from(ray.t_min),
             direction: direction / length,
             length: (ray.t_max - ray.t_min) * length,

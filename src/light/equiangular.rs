@@ -9,7 +9,7 @@ use crate::math::{DVec3, Vec3};
 
 /// A straight way through a medium, from a point along a unit direction.
 #[derive(Clone, Copy, Debug)]
-pub struct Way {
+pub struct RaySegment {
     /// Where it begins.
     pub origin: DVec3,
     /// Unit direction.
@@ -34,7 +34,7 @@ pub struct Equiangular {
 
 impl Equiangular {
     /// For a light around a point, which shines on this part of the way.
-    fn new(way: &Way, middle: DVec3, [near, far]: [f32; 2]) -> Option<Self> {
+    fn new(way: &RaySegment, middle: DVec3, [near, far]: [f32; 2]) -> Option<Self> {
         let (to_middle, direction) = (middle - way.origin, way.direction.as_dvec3());
         let foot = to_middle.dot(direction);
         let height = (to_middle - direction * foot).length() as f32;
@@ -66,7 +66,7 @@ impl Equiangular {
 
 impl Light {
     /// Distances along a way by what arrives there; `None` of lights at infinity, and where nothing arrives.
-    pub fn equiangular(&self, geometry: &Geometry, way: &Way) -> Option<Equiangular> {
+    pub fn equiangular(&self, geometry: &Geometry, way: &RaySegment) -> Option<Equiangular> {
         let LightBounds { bounds, cone, two_sided, .. } = self.bounds(geometry)?;
         let middle = bounds.center().as_dvec3();
         let half_angle = cone.spread + cone.reach;
@@ -80,7 +80,7 @@ impl Light {
 }
 
 /// The part of a way within a cone from `apex` along a unit `axis`, whose half-angle is at most a right angle.
-fn within_cone(way: &Way, apex: DVec3, axis: Vec3, half_angle: f32) -> Option<[f32; 2]> {
+fn within_cone(way: &RaySegment, apex: DVec3, axis: Vec3, half_angle: f32) -> Option<[f32; 2]> {
     debug_assert!(half_angle <= 0.5 * PI);
     let (o, d) = (way.origin - apex, way.direction.as_dvec3());
     let axis = axis.as_dvec3();
@@ -124,9 +124,9 @@ mod tests {
     use crate::light::{PointLight, SpotLight};
     use crate::math::{Rng, vec3};
 
-    fn way(rng: &mut Rng) -> Way {
+    fn way(rng: &mut Rng) -> RaySegment {
         let length = if rng.unit() < 0.3 { f32::INFINITY } else { 8.0 * rng.unit_f32() + 0.1 };
-        Way { origin: rng.cube() * 3.0, direction: rng.direction().as_vec3(), length }
+        RaySegment { origin: rng.cube() * 3.0, direction: rng.direction().as_vec3(), length }
     }
 
     #[test]
@@ -186,7 +186,7 @@ mod tests {
     #[test]
     fn a_way_through_the_light_has_no_density() {
         let light = Light::Point(PointLight { position: DVec3::X, intensity: Rgb::WHITE });
-        let way = Way { origin: DVec3::ZERO, direction: vec3(1.0, 0.0, 0.0), length: 3.0 };
+        let way = RaySegment { origin: DVec3::ZERO, direction: vec3(1.0, 0.0, 0.0), length: 3.0 };
         assert!(light.equiangular(&Geometry::default(), &way).is_none());
     }
 }

@@ -20,7 +20,7 @@ pub use area::{AreaLight, Emission};
 pub(crate) use area::{placed_area, triangle_error};
 pub use directional::DirectionalLight;
 pub use environment::{Environment, EnvironmentMap, EnvironmentMapError, EnvironmentScratch};
-pub use equiangular::{Equiangular, Way};
+pub use equiangular::{Equiangular, RaySegment};
 pub use groups::LightGroups;
 pub use ies::{IesLight, IesProfile};
 pub use point::PointLight;

@@ -78,14 +78,14 @@ pub struct Volume {
 
 /// Until the next collision.
 #[derive(Clone, Debug)]
-pub struct Flight {
+pub struct FreeFlight {
     /// Optical depth to it, exponentially distributed.
     pub depth: f32,
     /// What else is left to chance.
     pub random: Rng,
 }
 
-impl Flight {
+impl FreeFlight {
     /// With an optical depth by `u` in `[0, 1)`.
     pub fn new(u: f32, random: Rng) -> Self {
         Self { depth: exponential(u), random }
@@ -154,7 +154,7 @@ impl Volume {
     }
 
     /// Follows a path that carries these channels along a ray to its end or to where `medium` scatters it.
-    pub fn track(&self, medium: &Medium, ray: &Ray, carried: Rgb, flight: &mut Flight) -> Tracked {
+    pub fn track(&self, medium: &Medium, ray: &Ray, carried: Rgb, flight: &mut FreeFlight) -> Tracked {
         let mut tracked = Tracked { t: None, weight: Rgb::WHITE, emitted: Rgb::BLACK };
         let Some(ray) = UnitRay::new(ray, &self.unit_from_render) else { return tracked };
         for segment in BlockWalk::new(&ray, self.blocks) {

@@ -1,7 +1,7 @@
 //! The library in a few lines: a scene is opened or built, rendered and saved. The command line is built on it.
 //!
 //! A change of the scene between two renders costs what it needs: the accelerator is built again only if shapes have
-//! changed, and files are not read again. The picture has the same bits as that of a renderer which is made anew.
+//! changed, and files are not read again. The picture has the same bits as that of a new renderer.
 
 mod assignment;
 mod changes;

@@ -2,6 +2,7 @@
 //! light at vertices, whose distances follow the extinction.
 
 use super::Context;
+use super::media::{Purpose, random};
 use super::radiance::Output;
 use super::wave::Wave;
 use crate::color::Rgb;
@@ -101,9 +102,13 @@ pub(super) fn add(context: &Context, wave: &Wave, path: &OnTheWay, segment: &Fir
     if contribution.is_black() || !contribution.is_finite() {
         return 0;
     }
-    let seed = (u64::from(path.seed) << 32 | u64::from(path.sample)) ^ u64::from(u[3].to_bits());
     let start = SpawnPoint { p, n: Vec3::ZERO, error: 0.0 };
-    let shadow = Shadow { start, sample, time: path.time, random: Rng::new(seed) };
+    let shadow = Shadow {
+        start,
+        sample,
+        time: path.time,
+        random: random(context, path.seed, path.sample, Purpose::LightDistance),
+    };
     let (left, traced) = shadow.trace(context, path.state);
     if left.is_black() {
         return traced;

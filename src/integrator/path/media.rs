@@ -69,13 +69,15 @@ fn arrive(context: &Context, paths: &mut PathRows, i: usize, state: &mut MediaSt
 
 /// What random numbers beyond those of the sampler are for.
 #[derive(Clone, Copy)]
-enum Purpose {
+pub(super) enum Purpose {
     Distance,
     Shadow,
+    /// The shadow ray from a distance that is chosen for a light.
+    LightDistance,
 }
 
 /// Random numbers of a segment of a path.
-fn random(context: &Context, seed: u32, sample: u32, purpose: Purpose) -> Rng {
+pub(super) fn random(context: &Context, seed: u32, sample: u32, purpose: Purpose) -> Rng {
     let path = hash64(u64::from(seed) << 32 | u64::from(sample));
     Rng::new(hash64(path ^ (u64::from(context.bounce) << 8 | purpose as u64)))
 }
