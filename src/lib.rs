@@ -66,6 +66,7 @@ pub mod render;
 mod renderer;
 pub mod sampling;
 pub mod scene;
+mod subsurface;
 pub mod suggestion;
 pub mod texture;
 

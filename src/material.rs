@@ -419,6 +419,17 @@ impl Material {
         }
     }
 
+    /// Whether light enters its surface for a random walk; not of materials that it consists of.
+    pub fn has_walk(&self) -> bool {
+        match self {
+            Self::Constant(Bsdf::Principled(bsdf)) => bsdf.has_walk(),
+            Self::Textured(textured, _) => {
+                matches!(&**textured, TexturedMaterial::Principled(inputs) if inputs.has_walk())
+            }
+            _ => false,
+        }
+    }
+
     /// Whether any input is textured.
     pub fn is_textured(&self) -> bool {
         !self.textures().is_empty()

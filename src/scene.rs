@@ -15,6 +15,7 @@ use crate::math::Vec3;
 use crate::math::random::hash64;
 use crate::medium::Media;
 use crate::normal_perturbation::NormalPerturbation;
+use crate::subsurface::Subsurface;
 use crate::texture::{Footprint, Texture};
 
 /// How a shape looks.
@@ -72,6 +73,8 @@ pub struct SceneFeatures {
     pub media: bool,
     /// Some medium scatters or emits light.
     pub participating_media: bool,
+    /// Light enters the surface of some material and is scattered below it.
+    pub subsurface: bool,
     /// Some material is anisotropic: shading frames follow the surface's u direction.
     pub anisotropic: bool,
     /// The camera has a lens.
@@ -95,6 +98,8 @@ pub struct Scene {
     pub media: Media,
     /// Those of materials that are parts of others, by [`MaterialId`]; empty if there are none.
     pub part_normal_perturbations: Vec<Option<NormalPerturbationId>>,
+    /// How light is scattered below the surfaces of materials, by [`MaterialId`]; empty if it is below none.
+    pub subsurface: Vec<Option<Subsurface>>,
     /// Textures, by [`TextureId`](crate::id::TextureId).
     pub textures: Vec<Texture>,
     /// Lights and their choice.

@@ -57,6 +57,10 @@ impl MaterialTable {
                         .files
                         .error(&place, format!("\"{base}\" lets light through: what is below a coat must be opaque")));
                 }
+                if self.any_part(base_id, &|id| self.has_subsurface(id)) {
+                    let message = format!("\"{base}\" has a random walk below its surface: use `clearcoat`");
+                    return Err(compiler.files.error(&place, message));
+                }
                 self.check_no_relief(compiler, &place, base, base_id)?;
                 let coating = Coating {
                     coat: CoatInput::new(

@@ -9,17 +9,19 @@ use super::textures::{TextureTable, TextureUse};
 use crate::bsdf::{Beckmann, Coat, Conductor, Ggx, Lambert, SeparableGgx, diffuse_mean, mitsuba_diffuse_mean};
 use crate::color::Rgb;
 use crate::desc::{
-    ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, PlasticDesc, RangedDesc, RoughnessDesc,
-    ScalarDesc, SceneDesc, UsedNames,
+    ColorDesc, DielectricDesc, DistributionDesc, IntegratorDesc, MaterialDesc, PhongLobeDesc, PlasticDesc, RangedDesc,
+    RoughnessDesc, ScalarDesc, SceneDesc, UsedNames,
 };
 use crate::error::Result;
 use crate::id::{MaterialId, NormalPerturbationId, TextureId};
 use crate::material::{
     AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, RangedInput, ScalarInput, TexturedMaterial,
 };
+use crate::math::RenderSpace;
 use crate::medium::{Media, Medium};
 use crate::metal::{Metal, MetalNames};
 use crate::normal_perturbation::NormalPerturbation;
+use crate::subsurface::Subsurface;
 use crate::suggestion::did_you_mean;
 use crate::texture::Texture;
 
@@ -35,6 +37,8 @@ pub struct MaterialTable {
     names: HashMap<String, MaterialBinding>,
     /// The medium of each material that has one.
     pub(super) medium_of: HashMap<MaterialId, Medium>,
+    /// How light is scattered below the surface of each material where it is.
+    subsurface_of: HashMap<MaterialId, Subsurface>,
 }
 
 /// The compiled material of a shape.
@@ -69,9 +73,11 @@ impl MaterialTable {
             by_material: HashMap::new(),
             names: HashMap::new(),
             medium_of: HashMap::new(),
+            subsurface_of: HashMap::new(),
         };
         let media = NamedMedia::new(files, desc, used)?;
-        let compiler = Compiler { files, textures: &textures, media: &media };
+        let random_walks = matches!(desc.integrator, IntegratorDesc::Path { .. });
+        let compiler = Compiler { files, textures: &textures, media: &media, random_walks };
         for name in desc.materials.keys() {
             let mut outer = Vec::new();
             let added = table.add(&compiler, desc, name, &mut outer);
@@ -110,7 +116,15 @@ impl MaterialTable {
             }
             plain => self.medium_within(compiler.files, &path, &material)?.or(compiler.medium(&path, plain)?),
         };
+        let subsurface = match &desc.materials[name] {
+            MaterialDesc::Principled(desc) => compiler.subsurface(&path, desc)?,
+            MaterialDesc::Relief { material, .. } => {
+                self.names.get(material).and_then(|binding| self.subsurface_of.get(&binding.material)).copied()
+            }
+            _ => None,
+        };
         let id = self.push(material);
+        self.subsurface_of.extend(subsurface.map(|subsurface| (id, subsurface)));
         self.medium_of.extend(medium.map(|medium| (id, medium)));
         let normal_perturbation = compiler
             .normal_perturbation(desc, &path, &desc.materials[name])?
@@ -148,6 +162,22 @@ impl MaterialTable {
             || self.any_part(binding.material, &|id| is_map(self.normal_perturbation_of(id)))
     }
 
+    /// Whether light is scattered below the surface of a material, not of its parts.
+    pub(super) fn has_subsurface(&self, id: MaterialId) -> bool {
+        self.subsurface_of.contains_key(&id)
+    }
+
+    /// How light is scattered below the surfaces of materials, by [`MaterialId`]; empty if it is below none.
+    pub fn subsurface(&self, space: &RenderSpace) -> Vec<Option<Subsurface>> {
+        let placed = |id: MaterialId| {
+            let scale = space.scale() as f32;
+            let place = |subsurface: &Subsurface| Subsurface { radius: subsurface.radius * scale, ..*subsurface };
+            self.subsurface_of.get(&id).map(place)
+        };
+        let count = if self.subsurface_of.is_empty() { 0 } else { self.materials.len() };
+        (0..count).map(|i| placed(MaterialId::new(i))).collect()
+    }
+
     /// The material of a name, or the default.
     pub fn find(&self, files: &CompileContext, path: &str, name: Option<&str>) -> Result<MaterialBinding> {
         let Some(name) = name else {
@@ -164,6 +194,8 @@ pub(super) struct Compiler<'a> {
     pub(super) files: &'a CompileContext,
     pub(super) textures: &'a TextureTable,
     pub(super) media: &'a NamedMedia<'a>,
+    /// Whether the integrator has random walks below surfaces.
+    pub(super) random_walks: bool,
 }
 
 impl Compiler<'_> {

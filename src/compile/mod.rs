@@ -255,6 +255,11 @@ impl Builder {
         }
         check_light(files, &desc.integrator, lights.shines(), &in_use)?;
         let part_normal_perturbations = self.materials.part_normal_perturbations();
+        let subsurface = self.materials.subsurface(&self.space);
+        if has_photons(&desc.integrator) && !subsurface.is_empty() {
+            let message = "photons are not traced below surfaces: `subsurface_method` \"random_walk\"";
+            return Err(files.error("integrator.caustics", message));
+        }
         let materials = self.materials.materials;
         let normal_perturbations = !part_normal_perturbations.is_empty()
             || self.surfaces.iter().any(|surface| surface.normal_perturbation.is_some());
@@ -276,6 +281,7 @@ impl Builder {
             delta_materials: materials.iter().any(|material| material.flags().is_delta()),
             media: !in_use.is_empty(),
             participating_media: in_use.iter().any(Medium::is_participating),
+            subsurface: !subsurface.is_empty(),
             anisotropic,
             lens: camera.lens().is_some(),
             motion: self.geometry.is_moving() || camera.is_moving(),
@@ -287,6 +293,7 @@ impl Builder {
             normal_perturbations: self.materials.normal_perturbations,
             media: self.materials.media,
             part_normal_perturbations,
+            subsurface,
             textures: self.materials.textures.textures,
             lights,
             light_groups,

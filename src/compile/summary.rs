@@ -134,6 +134,7 @@ fn features(scene: &Scene) -> Vec<&'static str> {
         (f.delta_materials, "mirror or glass"),
         (f.media, "media"),
         (f.participating_media, "participating media"),
+        (f.subsurface, "subsurface scattering"),
         (f.anisotropic, "anisotropic materials"),
         (f.lens, "lens"),
         (f.motion, "motion"),

@@ -40,7 +40,7 @@ pub use medium::{AbsorptionDesc, BorderDesc, CoefficientDesc, MediumDesc, Medium
 pub use mesh::{AttributeDesc, MeshShadingDesc, NormalWeightDesc, SmoothByDesc};
 pub use output::{CompressionDesc, CryptoManifestDesc, ExrProfileDesc, LayerKind, OutputDesc, PixelTypeDesc, ViewDesc};
 pub(crate) use principled::principled_parameters;
-pub use principled::{PrincipledDesc, PrincipledModelDesc};
+pub use principled::{PrincipledDesc, PrincipledModelDesc, SubsurfaceMethodDesc};
 pub use relief::{BumpMapDesc, NormalMapDesc};
 pub use settings::{
     CausticsDesc, DEFAULT_RR_DEPTH, FilmDesc, FilterDesc, FilterSamplesDesc, IntegratorDesc, MAX_FILTER_RADIUS,

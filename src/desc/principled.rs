@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ColorDesc, RangedDesc, ScalarDesc};
+use super::{CoefficientDesc, ColorDesc, RangedDesc, ScalarDesc};
 
 /// The parameters of the principled model in one table: `$generate!` gets the documentation, name, kind and default of
 /// each. A `scalar` is within `[0, 1]`; `specular` and `ior` exclude each other.
@@ -35,7 +35,8 @@ least 1.05, and no texture for either."]
             clearcoat: scalar = 0.0,
             /// From a satin to a glossy coat. Default: 1.
             clearcoat_gloss: scalar = 1.0,
-            /// From the diffuse lobe to a flatter one that resembles subsurface scattering. Default: 0.
+            /// How much of the diffuse base's light is scattered below the surface, by `subsurface_method`: a flatter
+            /// lobe that resembles it, or in truth. Default: 0.
             subsurface: scalar = 0.0,
             /// How much of what is not metal is glass, whose inside is the side against the normal. Default: 0.
             transmission: scalar = 0.0,
@@ -78,11 +79,30 @@ macro_rules! describe {
         #[serde(default, deny_unknown_fields)]
         pub struct PrincipledDesc {
             $($(#[doc = $doc])* $(#[serde $serde])? pub $name: written!($kind),)*
+            /// What `subsurface` is. Default: `flat`.
+            #[serde(skip_serializing_if = "SubsurfaceMethodDesc::is_flat")]
+            pub subsurface_method: SubsurfaceMethodDesc,
+            /// Of `random_walk`: the mean way, in world units, after which light below the surface has lost its
+            /// direction, above 0: one number, or one for each of red, green and blue. Default: 1, 0.2, 0.1.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            pub subsurface_radius: Option<CoefficientDesc>,
+            /// Factor on `subsurface_radius`, above 0. Default: 1.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            pub subsurface_scale: Option<f32>,
+            /// Of `random_walk`: the mean cosine of a single scattering, from -0.9 to 0.9. Default: 0.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            pub subsurface_anisotropy: Option<f32>,
         }
 
         impl Default for PrincipledDesc {
             fn default() -> Self {
-                Self { $($name: written!($kind $default),)* }
+                Self {
+                    $($name: written!($kind $default),)*
+                    subsurface_method: SubsurfaceMethodDesc::Flat,
+                    subsurface_radius: None,
+                    subsurface_scale: None,
+                    subsurface_anisotropy: None,
+                }
             }
         }
     };
@@ -105,5 +125,24 @@ impl PrincipledModelDesc {
     /// Whether it is the default.
     pub fn is_burley(&self) -> bool {
         *self == Self::Burley
+    }
+}
+
+/// What the subsurface scattering of the principled model is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SubsurfaceMethodDesc {
+    /// A lobe that is flatter than the diffuse one: light leaves where it arrives.
+    #[default]
+    Flat,
+    /// Light enters, is scattered within the closed surface and leaves it elsewhere, with the base's colour on flat
+    /// ground. Other integrators than `path` take the flat lobe.
+    RandomWalk,
+}
+
+impl SubsurfaceMethodDesc {
+    /// Whether it is the default.
+    pub fn is_flat(&self) -> bool {
+        *self == Self::Flat
     }
 }

@@ -5,6 +5,7 @@ use super::path::Arrival;
 use crate::bsdf::Bsdf;
 use crate::color::Rgb;
 use crate::geometry::{Hit, SurfaceInteraction};
+use crate::id::ShapeId;
 use crate::math::{Aabb, Ray, Vec3, vec3};
 use crate::medium::{BoundaryMedia, MediumStack, RelativeIor, random_of_ray};
 use crate::scene::Scene;
@@ -54,10 +55,15 @@ pub(super) fn bounds(scene: &Scene) -> Aabb {
     if !scene.features.media {
         return Aabb::EMPTY;
     }
+    bounds_of(scene, |id| scene.surface(id).medium.is_some())
+}
+
+/// A box around the shapes that are chosen.
+pub(super) fn bounds_of(scene: &Scene, is_chosen: impl Fn(ShapeId) -> bool) -> Aabb {
     let geometry = &scene.geometry;
-    let of_shapes = |ids: &[crate::id::ShapeId]| {
-        let media = ids.iter().filter(|&&id| scene.surface(id).medium.is_some());
-        media.fold(Aabb::EMPTY, |b, &id| b.union(&geometry.shape(id).bounds()))
+    let of_shapes = |ids: &[ShapeId]| {
+        let chosen = ids.iter().filter(|&&id| is_chosen(id));
+        chosen.fold(Aabb::EMPTY, |b, &id| b.union(&geometry.shape(id).bounds()))
     };
     geometry.instances.iter().fold(of_shapes(&geometry.world), |b, instance| {
         let inside = of_shapes(&geometry.object(instance.object).shapes);

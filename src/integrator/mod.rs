@@ -17,6 +17,7 @@ mod render_context;
 mod roulette;
 mod shading;
 mod strategy;
+mod subsurface;
 mod surface;
 mod vertex;
 mod whitted;

@@ -78,18 +78,29 @@ impl DistanceSample {
         let channel = if u[0] < shares[0] { 0 } else { last.min(if u[0] < shares[0] + shares[1] { 1 } else { 2 }) };
         Self { shares, channel, flight: FreeFlight::new(u[1], random), carried: throughput }
     }
+
+    /// The distance to the next scattering by a homogeneous medium, if nothing is in the way.
+    pub fn reach(&self, medium: &Medium) -> f32 {
+        let of_channel = medium.extinction().to_array()[self.channel];
+        if of_channel > 0.0 { self.flight.depth / of_channel } else { f32::INFINITY }
+    }
 }
 
 /// Contribution and density of a ray so far, by channel.
-struct Track {
+pub(super) struct Track {
     value: Rgb,
     pdf: Rgb,
     shares: Rgb,
 }
 
 impl Track {
+    /// At the start of a ray.
+    pub fn new(sample: &DistanceSample) -> Self {
+        Self { value: Rgb::WHITE, pdf: Rgb::WHITE, shares: sample.shares.into() }
+    }
+
     /// Balance heuristic over the channels.
-    fn weight(&self) -> Rgb {
+    pub fn weight(&self) -> Rgb {
         let Rgb { r, g, b } = self.pdf * self.shares;
         self.value / (r + g + b)
     }
@@ -104,7 +115,7 @@ impl World<'_> {
         state: &mut MediaState,
         mut sample: DistanceSample,
     ) -> MediumPath {
-        let mut track = Track { value: Rgb::WHITE, pdf: Rgb::WHITE, shares: sample.shares.into() };
+        let mut track = Track::new(&sample);
         let mut emitted = Rgb::BLACK;
         let mut passed = 0;
         let mut first = None;
@@ -208,14 +219,14 @@ fn scattering_at(id: MediumId, t: f32) -> Hit {
 }
 
 /// Goes up to `distance` through a medium; the distance to where it scatters, if it does.
-fn travel(medium: &Medium, distance: f32, sample: &mut DistanceSample, track: &mut Track) -> Option<f32> {
+pub(super) fn travel(medium: &Medium, distance: f32, sample: &mut DistanceSample, track: &mut Track) -> Option<f32> {
     let extinction = medium.extinction();
     if medium.scattering.is_black() {
         track.value *= transmittance(extinction, distance);
         return None;
     }
     let of_channel = extinction.to_array()[sample.channel];
-    let free = if of_channel > 0.0 { sample.flight.depth / of_channel } else { f32::INFINITY };
+    let free = sample.reach(medium);
     if free < distance {
         let left = transmittance(extinction, free);
         track.value *= left * medium.scattering;

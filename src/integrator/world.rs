@@ -1,5 +1,6 @@
 //! A scene with its accelerator: rays in, surface interactions out.
 
+use super::subsurface::SubsurfaceShapes;
 use crate::accel::Accelerator;
 use crate::color::Rgb;
 use crate::geometry::{Analytic, Detail, Hit, Mesh, Shape, SurfaceInteraction};
@@ -31,6 +32,8 @@ pub struct World<'a> {
     parametrization: Vec<Parametrization>,
     /// Around all surfaces of media.
     pub(super) media_bounds: Aabb,
+    /// Those that light enters for a random walk.
+    pub(super) subsurface: SubsurfaceShapes,
 }
 
 impl<'a> World<'a> {
@@ -44,6 +47,7 @@ impl<'a> World<'a> {
             reach_squared: bounds.size().max_element().powi(2),
             parametrization: parametrization(scene),
             media_bounds: super::media::bounds(scene),
+            subsurface: SubsurfaceShapes::new(scene),
         }
     }
 

@@ -30,11 +30,16 @@ macro_rules! inputs {
         #[derive(Clone, Debug, PartialEq)]
         pub struct PrincipledInputs {
             $($(#[doc = $doc])* pub $name: input!($kind),)*
+            /// As [`PrincipledParameters::random_walk`].
+            pub random_walk: bool,
         }
 
         impl PrincipledInputs {
             pub(super) fn parameters(&self, textures: &[Texture], footprint: &Footprint) -> PrincipledParameters {
-                PrincipledParameters { $($name: input!($kind self.$name, textures, footprint),)* }
+                PrincipledParameters {
+                    $($name: input!($kind self.$name, textures, footprint),)*
+                    random_walk: self.random_walk,
+                }
             }
 
             pub(super) fn textures(&self) -> Vec<TextureId> {
@@ -52,5 +57,10 @@ impl PrincipledInputs {
         flags.set(BsdfFlags::TRANSMISSION, !self.transmission.is_zero() || !self.diffuse_transmission.is_zero());
         flags.set(BsdfFlags::ANISOTROPIC, !self.anisotropic.is_zero());
         flags
+    }
+
+    /// Whether light enters the surface for a random walk, for some values of its textures.
+    pub(super) fn has_walk(&self) -> bool {
+        self.random_walk && !self.subsurface.is_zero()
     }
 }

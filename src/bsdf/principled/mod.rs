@@ -16,8 +16,8 @@
 //! - GGX masks with the height-correlated G2, and light scattered among microfacets several times is added back;
 //! - alpha is `roughness²` stretched by the aspect, within `[0.001, 1]`, for distribution and masking alike;
 //! - tints are the base colour over its largest channel in place of its luminance, so that no channel exceeds 1;
-//! - subsurface scattering is the flat lobe of 2012 for solids as well; glass has exact Fresnel terms, all else
-//!   Schlick's;
+//! - subsurface scattering is the flat lobe of 2012 for solids as well, or light that enters: a [random walk](walk) goes
+//!   on from there; glass has exact Fresnel terms, all else Schlick's;
 //! - the specular lobe that passes a thin sheet has the width of the one that it reflects.
 //!
 //! [`PrincipledModel::Mitsuba`] has the lobes of Mitsuba 3's `principled` and, for thin sheets of glass,
@@ -31,6 +31,7 @@ mod parameters;
 mod rows;
 pub(super) mod shapes;
 mod split;
+mod walk;
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -84,6 +85,8 @@ struct LobePmf {
     diffuse: f32,
     diffuse_transmission: f32,
     glass: f32,
+    /// Light that enters the surface: a delta lobe, for light sampling cannot find it.
+    walk: f32,
 }
 
 impl Principled {
@@ -166,7 +169,7 @@ impl Principled {
                 0.0
             },
             sheen: if self.p.sheen > 0.0 { principled_sheen(cos) } else { 0.0 },
-            diffuse: principled_diffuse(self.p.roughness, self.p.subsurface, cos),
+            diffuse: self.diffuse_albedo(cos),
         }
     }
 
@@ -216,10 +219,12 @@ impl Principled {
         let base = self.dielectric() * left.min(self.p.base_color.mean());
         let around =
             self.dielectric() * left * self.p.sheen * at.sheen + (1.0 - at.facets) * self.multiple.mean().min(1.0);
-        let diffuse = below * (base * (1.0 - self.p.diffuse_transmission) + around);
+        let entering = self.entering();
+        let diffuse = below * (base * (1.0 - self.p.diffuse_transmission - entering) + around);
         let diffuse_transmission = below * base * self.p.diffuse_transmission;
         let glass = below * self.glass;
-        let sum = at.clearcoat + specular + diffuse + diffuse_transmission + glass;
+        let walk = below * base * entering;
+        let sum = at.clearcoat + specular + diffuse + diffuse_transmission + glass + walk;
         let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
         LobePmf {
             clearcoat: at.clearcoat * scale,
@@ -227,6 +232,7 @@ impl Principled {
             diffuse: diffuse * scale,
             diffuse_transmission: diffuse_transmission * scale,
             glass: glass * scale,
+            walk: walk * scale,
         }
     }
 
@@ -307,7 +313,8 @@ impl Principled {
         }
         let mut shape = shapes::diffuse(o, i, self.p.roughness);
         if self.p.subsurface > 0.0 {
-            shape += (shapes::subsurface(o, i, self.p.roughness) - shape) * self.p.subsurface;
+            let flat = if self.p.random_walk { 0.0 } else { shapes::subsurface(o, i, self.p.roughness) };
+            shape += (flat - shape) * self.p.subsurface;
         }
         let mut value = self.p.base_color * ((1.0 - self.p.diffuse_transmission) * shape);
         if self.p.sheen > 0.0 {
@@ -327,6 +334,9 @@ impl Principled {
         let o = vec3(wo.x, wo.y, wo.z.abs());
         let at_o = self.albedos::<ISOTROPIC>(o);
         let pmf = self.lobe_pmf(&at_o);
+        if pmf.walk > 0.0 && u_lobe >= 1.0 - pmf.walk {
+            return self.sample_walk(wo, &at_o, pmf.walk, u);
+        }
         let direction = self.sample_direction(wo, o, &pmf, u_lobe, u);
         let wi = direction.unwrap_or(Vec3::ZERO);
         let BsdfEval { value, pdf } = self.eval_from::<ISOTROPIC>(wo, wi, &at_o, &pmf);

@@ -21,11 +21,13 @@ macro_rules! parameters {
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct PrincipledParameters {
             $($(#[doc = $doc])* pub $name: value!($kind),)*
+            /// Whether `subsurface` is the share of light that enters the surface in place of the flat lobe.
+            pub random_walk: bool,
         }
 
         impl Default for PrincipledParameters {
             fn default() -> Self {
-                Self { $($name: value!($kind $default),)* }
+                Self { $($name: value!($kind $default),)* random_walk: false }
             }
         }
     };

@@ -41,6 +41,7 @@ impl Principled {
             diffuse_transmission: 0.0,
             multiscatter: false,
             model: if MITSUBA { PrincipledModel::Mitsuba } else { PrincipledModel::Burley },
+            random_walk: false,
         };
         BasicPrincipled(Self { p, glass: 0.0, ggx: Ggx::isotropic(self.ggx.alpha[0]), ..*self })
     }

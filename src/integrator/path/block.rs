@@ -2,7 +2,7 @@
 
 use super::Context;
 use super::materials::BsdfTable;
-use crate::bsdf::{BsdfEval, Lambert};
+use crate::bsdf::{Bsdf, BsdfEval, Lambert, Principled};
 use crate::color::Rgb;
 use crate::geometry::{Hit, SpawnPoint, SurfaceInteraction, WorldNormalRows, WorldPointRows};
 use crate::id::{InstanceId, PrimId, ShapeId};
@@ -314,9 +314,18 @@ impl Vertices {
     /// How light from the sampled direction leaves a vertex along its path.
     pub fn sampled_lobes(&self, scene: &Scene, lane: usize) -> LobeWeights {
         match (self.scatter.is_delta[lane] != 0, self.scatter.is_transmission[lane] != 0) {
+            (true, true) if self.enters(scene, lane).is_some() => LobeWeights::DIFFUSE,
             (true, true) => LobeWeights::Transmitted,
             (true, false) => LobeWeights::Reflected { diffuse: Rgb::BLACK },
             (false, _) => self.lobes(scene, lane, self.scatter.wi.get(lane)),
+        }
+    }
+
+    /// The material whose surface the sampled direction enters for a random walk: it has no other delta lobe.
+    pub fn enters<'a>(&'a self, scene: &'a Scene, lane: usize) -> Option<&'a Principled> {
+        match self.bsdfs.get(scene, lane) {
+            Some(Bsdf::Principled(bsdf)) if self.scatter.is_delta[lane] != 0 => Some(bsdf),
+            _ => None,
         }
     }
 

@@ -171,7 +171,7 @@ fn evaluate_textured(context: &Context, vertices: &mut Vertices) {
 }
 
 #[inline(always)]
-fn set_diffuse(vertices: &mut Vertices, lane: usize, albedo: Rgb) {
+pub(super) fn set_diffuse(vertices: &mut Vertices, lane: usize, albedo: Rgb) {
     vertices.bsdfs.ids[lane] = DIFFUSE;
     vertices.rows.albedo.set(lane, albedo);
 }

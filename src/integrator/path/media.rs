@@ -25,6 +25,9 @@ pub(super) fn pass_boundaries(context: &Context, wave: &mut Wave) -> u64 {
     let mut passed = 0;
     for index in 0..wave.count {
         let (block, i) = (index / BATCH, index % BATCH);
+        if skips_walk(wave, index) {
+            continue;
+        }
         let Wave { paths, rays, hits, media, cones, light_aovs, .. } = wave;
         let (paths, state) = (&mut paths[block], &mut media[index]);
         let mut ray = rays[block].get(i);
@@ -41,6 +44,15 @@ pub(super) fn pass_boundaries(context: &Context, wave: &mut Wave) -> u64 {
         arrive(context, paths, i, state, segment.ior);
     }
     passed
+}
+
+/// Whether a path was below a surface, where the media around that are not.
+fn skips_walk(wave: &mut Wave, index: usize) -> bool {
+    let is_below = wave.walks.get(index).is_some_and(Option::is_some);
+    if is_below {
+        wave.media[index] = MediaState { ior: None, arrival: None, departure: None, ..wave.media[index] };
+    }
+    is_below
 }
 
 /// Replaces the ray of a path by one that starts farther along it.
@@ -72,6 +84,8 @@ fn arrive(context: &Context, paths: &mut PathRows, i: usize, state: &mut MediaSt
 pub(super) enum Purpose {
     Distance,
     Shadow,
+    /// The random walk below a surface.
+    Walk,
     /// The shadow ray from a distance that is chosen for a light.
     LightDistance,
 }
@@ -89,6 +103,9 @@ pub(super) fn scatter(context: &Context, wave: &mut Wave, out: &mut Output) -> u
     let mut passed = 0;
     for index in 0..wave.count {
         let (block, i) = (index / BATCH, index % BATCH);
+        if skips_walk(wave, index) {
+            continue;
+        }
         let Wave { paths, rays, hits, media, cones, light_aovs, .. } = wave;
         let (paths, state) = (&mut paths[block], &mut media[index]);
         let mut ray = rays[block].get(i);

@@ -20,6 +20,7 @@ mod miss;
 mod photons;
 mod radiance;
 mod scatter;
+mod subsurface;
 mod surface_aovs;
 mod terminator;
 mod trace;
@@ -168,6 +169,9 @@ impl PathIntegrator {
             (context.bounce, context.is_last) = (bounce, bounce + 1 >= self.max_depth);
             let context = &context;
             trace::closest(context, wave, counts);
+            if context.scene.features.subsurface {
+                counts.indirect += subsurface::walk(context, wave);
+            }
             if context.scene.features.participating_media {
                 counts.indirect += media::scatter(context, wave, out);
             } else if context.scene.features.media {
@@ -178,6 +182,7 @@ impl PathIntegrator {
                 vertices::find(context, wave, block);
                 miss::add(context, wave, block, out);
                 materials::evaluate(context, wave, block);
+                subsurface::leave(wave, block);
                 surface_aovs::write(context, wave, block, out);
                 emission::add(context, wave, block, out);
                 if context.is_last {

@@ -14,6 +14,7 @@ use crate::bsdf::{BsdfEvalRows, BsdfQueryRows, BsdfSampleRows};
 use crate::color::{Rgb, RgbRows};
 use crate::id::LightId;
 use crate::integrator::media::MediaState;
+use crate::integrator::subsurface::Walk;
 use crate::integrator::{CameraBatch, CameraBlock, RayCounts};
 use crate::light::{LightQueue, LightSampleContext};
 use crate::math::compact::Compaction;
@@ -131,6 +132,8 @@ pub(super) struct Wave {
     pub hits: Vec<HitRows>,
     /// By path, in scenes with media.
     pub media: Vec<MediaState>,
+    /// By path, where it is below a surface, in scenes where light enters surfaces.
+    pub walks: Vec<Option<Walk>>,
     /// By path, where textures are filtered.
     pub cones: Vec<RayCone>,
     /// By path, where photons are gathered.
@@ -168,6 +171,10 @@ impl Wave {
         if context.scene.features.media {
             let state = |ray: &Ray| MediaState { current: context.world.media_at_start(ray), ..MediaState::default() };
             self.media.extend(samples.iter().map(|sample| state(&sample.ray)));
+        }
+        self.walks.clear();
+        if context.scene.features.subsurface {
+            self.walks.resize(samples.len(), None);
         }
         self.cones.clear();
         self.cones.extend(samples.iter().map_while(|sample| context.pass.render.camera_cone(&sample.ray)));
@@ -280,18 +287,25 @@ impl Wave {
     }
 
     fn has_optional_columns(&self) -> bool {
-        !(self.media.is_empty() && self.cones.is_empty() && self.caustics.is_empty() && self.photons.is_empty())
+        !(self.media.is_empty()
+            && self.walks.is_empty()
+            && self.cones.is_empty()
+            && self.caustics.is_empty()
+            && self.photons.is_empty())
     }
 
     /// Moves the state that only some renders have.
     fn append_optional(&mut self, context: &Context, block: usize, survivors: usize) {
-        let Self { vertices, media, cones, caustics, photons, light_aovs, .. } = self;
+        let Self { vertices, media, walks, cones, caustics, photons, light_aovs, .. } = self;
         let scatter = &vertices.scatter;
         let lanes = (0..vertices.count).filter(|&lane| scatter.status[lane] == spawn::SPAWNED);
         for (to, lane) in (survivors..).zip(lanes) {
             let path = block * BATCH + vertices.path(lane);
             if let Some(&state) = media.get(path) {
                 media[to] = super::media::after(context, vertices, lane, &state);
+            }
+            if to < walks.len() {
+                walks[to] = super::subsurface::after(context, vertices, lane);
             }
             if let Some(&cone) = cones.get(path) {
                 let is_specular = scatter.path_flags[lane] & path_flags::SPECULAR != 0;

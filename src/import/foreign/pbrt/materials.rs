@@ -96,19 +96,6 @@ impl Materials<'_> {
         })))
     }
 
-    fn subsurface(&mut self, params: &Params) -> Result<MaterialDesc> {
-        self.draft.approximated(
-            &params.place,
-            &params.element,
-            "",
-            "plastic, for light does not travel below surfaces",
-        );
-        for parameter in ["mfp", "mfreepath", "sigma_a", "sigma_s", "g", "scale", "name"] {
-            params.ignore(parameter, "light does not travel below surfaces");
-        }
-        self.plastic(params, 1.33)
-    }
-
     fn hair(&mut self, params: &Params) -> Result<MaterialDesc> {
         let number = |name: &str, default: f32| -> Result<f32> {
             Ok(match self.textures.get(params, &self.colors, name, Meaning::Number, true)? {
@@ -151,7 +138,7 @@ impl Materials<'_> {
         Ok(MaterialDesc::Coated { base, ior, roughness: None, alpha, tint })
     }
 
-    fn color(&mut self, params: &Params, name: &str, default: f32) -> Result<ColorDesc> {
+    pub(super) fn color(&mut self, params: &Params, name: &str, default: f32) -> Result<ColorDesc> {
         Ok(self.textures.reflectance(params, &self.colors, name, default)?.color(self.draft, &params.place))
     }
 
@@ -188,7 +175,7 @@ impl Materials<'_> {
     }
 
     /// The GGX alpha of the parameters with a prefix; `None` if the surface is smooth.
-    fn alpha(&mut self, params: &Params, prefix: &str, default: f32) -> Result<Option<RoughnessDesc>> {
+    pub(super) fn alpha(&mut self, params: &Params, prefix: &str, default: f32) -> Result<Option<RoughnessDesc>> {
         let remap = params.bool_or("remaproughness", true)?;
         let key = |name: &str| format!("{prefix}{name}");
         let both = self.textures.number(params, &self.colors, &key("roughness"), default)?;

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::colors::{Colors, Meaning};
 use super::directives::quoted;
 use super::params::Params;
+use super::subsurface::measured;
 use super::tokens::{Lexer, Position, TokenKind};
 use crate::desc::{CoefficientDesc, DielectricDesc, KeyframeDesc, MaterialDesc, MediumDesc, PhaseDesc, TransformDesc};
 use crate::error::Result;
@@ -73,17 +74,21 @@ impl MediumTable {
         }
         let scale = params.number_or("scale", 1.0)? as f32;
         let is_rgb_grid = kind == "rgbgrid";
-        let coefficient = |name: &str| -> Result<[f32; 3]> {
+        let preset = params.string("preset")?.filter(|_| !is_rgb_grid).and_then(measured);
+        let coefficient = |name: &str, preset: Option<[f32; 3]>| -> Result<[f32; 3]> {
             let given = if is_rgb_grid { None } else { colors.get(params, name, Meaning::Number)? };
-            Ok(given.unwrap_or([1.0; 3]).map(|c| c.max(0.0) * scale))
+            Ok(preset.or(given).unwrap_or([1.0; 3]).map(|c| c.max(0.0) * scale))
         };
-        let (absorption, scattering) = (coefficient("sigma_a")?, coefficient("sigma_s")?);
+        let absorption = coefficient("sigma_a", preset.map(|preset| preset.absorption))?;
+        let scattering = coefficient("sigma_s", preset.map(|preset| preset.scattering))?;
         let volume = match kind {
             "uniformgrid" => Some(medium.uniform_grid(draft)?),
             "rgbgrid" => Some(medium.rgb_grid(draft)?),
             _ => None,
         };
-        params.ignore("preset", "measured media are not known: the coefficients of the file or 1");
+        if preset.is_none() {
+            params.ignore("preset", "no such medium is known: the coefficients of the file or 1");
+        }
         let is_grid = volume.is_some();
         let brightness = if is_grid { 1.0 } else { params.number_or("Lescale", 1.0)? as f32 };
         let radiance = if is_rgb_grid { None } else { colors.get(params, "Le", Meaning::Emission)? };

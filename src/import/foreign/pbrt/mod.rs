@@ -15,6 +15,7 @@ mod options;
 mod params;
 mod shapes;
 mod state;
+mod subsurface;
 mod textures;
 mod tokens;
 mod transforms;
