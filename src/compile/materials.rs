@@ -9,8 +9,8 @@ use super::textures::{TextureTable, TextureUse};
 use crate::bsdf::{Beckmann, Coat, Conductor, Ggx, Lambert, SeparableGgx, diffuse_mean, mitsuba_diffuse_mean};
 use crate::color::Rgb;
 use crate::desc::{
-    ColorDesc, DielectricDesc, DistributionDesc, IntegratorDesc, MaterialDesc, PhongLobeDesc, PlasticDesc, RangedDesc,
-    RoughnessDesc, ScalarDesc, SceneDesc, UsedNames,
+    ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, PlasticDesc, RangedDesc, RoughnessDesc,
+    ScalarDesc, SceneDesc, UsedNames,
 };
 use crate::error::Result;
 use crate::id::{MaterialId, NormalPerturbationId, TextureId};
@@ -76,8 +76,7 @@ impl MaterialTable {
             subsurface_of: HashMap::new(),
         };
         let media = NamedMedia::new(files, desc, used)?;
-        let random_walks = matches!(desc.integrator, IntegratorDesc::Path { .. });
-        let compiler = Compiler { files, textures: &textures, media: &media, random_walks };
+        let compiler = Compiler { files, textures: &textures, media: &media };
         for name in desc.materials.keys() {
             let mut outer = Vec::new();
             let added = table.add(&compiler, desc, name, &mut outer);
@@ -194,8 +193,6 @@ pub(super) struct Compiler<'a> {
     pub(super) files: &'a CompileContext,
     pub(super) textures: &'a TextureTable,
     pub(super) media: &'a NamedMedia<'a>,
-    /// Whether the integrator has random walks below surfaces.
-    pub(super) random_walks: bool,
 }
 
 impl Compiler<'_> {

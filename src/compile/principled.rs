@@ -72,7 +72,7 @@ impl Compiler<'_> {
             }
         }
         self.check_random_walk(path, desc)?;
-        Ok(PrincipledInputs { random_walk: self.random_walks && !desc.subsurface_method.is_flat(), ..inputs })
+        Ok(PrincipledInputs { random_walk: !desc.subsurface_method.is_flat(), ..inputs })
     }
 
     /// Refuses a random walk together with what has none.
@@ -115,7 +115,7 @@ impl Compiler<'_> {
         let anisotropy = desc.subsurface_anisotropy.unwrap_or(0.0);
         let place = format!("{path}.subsurface_anisotropy");
         self.files.within(&place, f64::from(anisotropy), -MAX_ANISOTROPY, MAX_ANISOTROPY)?;
-        let is_there = self.random_walks && !matches!(desc.subsurface, ScalarDesc::Constant(0.0));
+        let is_there = !matches!(desc.subsurface, ScalarDesc::Constant(0.0));
         Ok(is_there.then(|| Subsurface { radius: Rgb::from(radius) * scale, anisotropy }))
     }
 }

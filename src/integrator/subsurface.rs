@@ -3,7 +3,7 @@
 //!
 //! Light enters diffusely, is scattered in a medium whose half-space has the base's colour at the point of entry, and
 //! leaves diffusely where the walk first is outside of all surfaces of such materials. All other surfaces are not there
-//! for it. What does not come out within [`MAX_STEPS`] is lost, and so is what leaves the box around these surfaces,
+//! for it. What does not come out within [`MAX_STEPS`] is lost, and so is what leaves a box around these surfaces,
 //! through a hole in one.
 
 use super::World;
@@ -29,6 +29,9 @@ const ROULETTE_BELOW: f32 = 0.5;
 /// The least radius, in roundings of points: points of a walk must not be on the wrong side of its surface.
 const MIN_RADIUS: f64 = 64.0;
 
+/// Points that are so near to a surface, in roundings, are on it.
+const NEAR: f64 = 4.0;
+
 /// How far in front of the surface, in roundings, the ray starts that stands in for the last one of a walk.
 const EXIT_DISTANCE: f64 = 4096.0;
 
@@ -36,6 +39,7 @@ const EXIT_DISTANCE: f64 = 4096.0;
 pub(super) struct SubsurfaceShapes {
     /// By shape; empty if it is below none.
     is_one: Vec<bool>,
+    /// Around all of them, three times as large.
     bounds: Aabb,
 }
 
@@ -47,6 +51,8 @@ impl SubsurfaceShapes {
         let has_walk = |surface: &crate::scene::Surface| has_part(scene, surface.material, Material::has_walk);
         let is_one: Vec<bool> = scene.surfaces.iter().map(has_walk).collect();
         let bounds = bounds_of(scene, |id| is_one[id.index()]);
+        // A flat surface has an inside, too.
+        let bounds = bounds.grown(f64::from(bounds.size().max_element()));
         Self { is_one, bounds }
     }
 
@@ -61,6 +67,8 @@ pub(super) struct Walk {
     medium: Medium,
     /// 1 where it has entered against the normal, else -1.
     side: f32,
+    /// How near to a surface points are on it.
+    near: f32,
 }
 
 /// Where a walk starts.
@@ -87,8 +95,8 @@ pub(super) struct WalkEnd {
 impl Walk {
     /// Into a surface of this colour, which a ray along `direction` has met.
     pub fn new(subsurface: &Subsurface, color: Rgb, at: &SurfaceInteraction, direction: Vec3) -> Self {
-        let least = (MIN_RADIUS * rounding(at)) as f32;
-        Self { medium: subsurface.medium(color, least), side: -1f32.copysign(direction.dot(at.n_g)) }
+        let [least, near] = [MIN_RADIUS, NEAR].map(|factor| (factor * rounding(at)) as f32);
+        Self { medium: subsurface.medium(color, least), side: -1f32.copysign(direction.dot(at.n_g)), near }
     }
 
     /// The end of a walk at a surface.
@@ -130,7 +138,10 @@ impl World<'_> {
                     weight = weight / left;
                 }
                 let direction = medium.phase.sample(-ray.direction, 0.0, [x, y])?.wi;
-                let p = (ray.origin.as_dvec3() + ray.direction.as_dvec3() * f64::from(free)).as_vec3();
+                let p = match at.filter(|at| at.t - free < walk.near) {
+                    Some(at) => at.spawn(-ray.direction).origin,
+                    None => (ray.origin.as_dvec3() + ray.direction.as_dvec3() * f64::from(free)).as_vec3(),
+                };
                 if !self.subsurface.bounds.contains(p) {
                     return None;
                 }
@@ -149,7 +160,7 @@ impl World<'_> {
                 }
                 ray = at.spawn(ray.direction);
             }
-            ray.t_max = sample.reach(medium);
+            ray.t_max = sample.reach(medium) + walk.near;
             hit = self.accel.intersect(&ray);
             *traced += 1;
         }

@@ -8,7 +8,7 @@ use super::media::MediaState;
 use super::surface::{FirstSurface, surface_sample};
 use super::vertex::Vertex;
 use super::{CameraBatch, CameraSample, Integrator, PassContext, RayCounts, SurfaceAovs, Workspace, World, dimensions};
-use crate::bsdf::BsdfSample;
+use crate::bsdf::{Bsdf, BsdfSample};
 use crate::color::Rgb;
 use crate::film::{LightAovRequest, LightAovRows, PixelSample, SurfaceSample};
 use crate::geometry::{Hit, SurfaceInteraction};
@@ -174,6 +174,11 @@ impl Segment {
         let mut vertex = Vertex::new(world, at, &self.ray, || self.footprint(world, at));
         if let Some(boundary) = boundary {
             vertex.bsdf = Cow::Owned(boundary);
+        }
+        if let Bsdf::Principled(bsdf) = &*vertex.bsdf
+            && bsdf.has_walk()
+        {
+            vertex.bsdf = Cow::Owned(Bsdf::Principled(bsdf.without_walk()));
         }
         vertex
     }

@@ -47,6 +47,10 @@ impl CausticPass {
             tracing::warn!("photons are not traced through media that scatter or emit light");
             return None;
         }
+        if scene.features.subsurface {
+            tracing::warn!("photons are not traced below surfaces");
+            return None;
+        }
         let casters = CausticCasters::new(scene)?;
         let [width, height] = settings.size.map(f64::from);
         let traced = (PHOTONS_PER_PIXEL * width * height).clamp(*PHOTONS.start(), *PHOTONS.end()) as u32;

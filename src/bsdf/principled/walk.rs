@@ -1,6 +1,6 @@
 //! Light that enters the surface, for a random walk below it.
 
-use super::{LobeAlbedos, Principled, principled_diffuse};
+use super::{LobeAlbedos, Principled, PrincipledParameters, principled_diffuse};
 use crate::bsdf::BsdfSample;
 use crate::color::Rgb;
 use crate::math::{Vec3, vec3};
@@ -46,6 +46,11 @@ impl Principled {
     /// The colour of the base, which light has that enters the surface and leaves it again.
     pub fn base_color(&self) -> Rgb {
         self.p.base_color
+    }
+
+    /// With the flat lobe in place of light that enters.
+    pub fn without_walk(&self) -> Self {
+        Self { p: PrincipledParameters { random_walk: false, ..self.p }, ..*self }
     }
 
     /// Whether light enters the surface.

@@ -4,11 +4,14 @@ use super::colors::{Colors, Meaning};
 use super::octahedral;
 use super::params::Params;
 use super::state::{Ctm, World, matrix, rotation_and_scale};
-use crate::assets::{RgbImage, read_rgb_image};
-use crate::desc::{DirectionalLightDesc, EnvironmentLightDesc, LightDesc, PointLightDesc, SpotLightDesc};
+use crate::assets::{RgbImage, read_image, read_rgb_image};
+use crate::desc::{
+    ColorSpaceDesc, DirectionalLightDesc, EnvironmentLightDesc, LightDesc, PointLightDesc, ProjectorLightDesc,
+    SpotLightDesc, TextureDesc, TextureFilterDesc, WrapDesc,
+};
 use crate::error::Result;
 use crate::import::foreign::Draft;
-use crate::math::{DMat3, DVec3};
+use crate::math::{DAffine3, DMat3, DVec3};
 
 /// Reads a `LightSource`. pbrt divides each light by what its spectrum measures in nits, and the film takes a nit as 1.
 pub struct Lights<'a> {
@@ -81,15 +84,50 @@ impl Lights<'_> {
                 })
             }
             "infinite" => LightDesc::Environment(self.environment(draft, params, &map.matrix3)?),
-            "projection" => {
-                draft.ignored(&params.place, &params.element, "", "projection lights are unsupported");
-                return Ok(());
-            }
+            "projection" => self.projection(draft, params, &map)?,
             other => return Err(params.error(format!("unknown light \"{other}\""))),
         };
         params.report(draft);
         draft.add_light(&params.place, light);
         Ok(())
+    }
+
+    /// A projector, whose shorter side has the angle `fov`.
+    fn projection(&self, draft: &mut Draft, params: &Params, map: &DAffine3) -> Result<LightDesc> {
+        let Some(file) = params.string("filename")? else { return Err(params.error("needs a filename")) };
+        let asset = self.colors.folder.join(file);
+        let image = read_image(&asset)
+            .map_err(|error| error.at(self.scene, &format!("{}: {}", params.place, params.element), &asset))?;
+        let aspect = image.width as f64 / image.height as f64;
+        let half = (params.number_or("fov", 90.0)?.clamp(0.01, 179.0).to_radians() / 2.0).tan();
+        let how = "even irradiance of a plane in place of even intensity: brighter away from the middle";
+        draft.approximated(&params.place, &params.element, "", how);
+        params.ignore("power", "the picture has the scale of the file");
+        if map.matrix3.determinant() > 0.0 {
+            draft.approximated(&params.place, &params.element, "transform", "the picture is not mirrored");
+        }
+        let scale = params.number_or("scale", 1.0)? * self.exposure;
+        let texture = TextureDesc::Image {
+            file: file.into(),
+            color_space: ColorSpaceDesc::Auto,
+            filter: TextureFilterDesc::Bilinear,
+            wrap: WrapDesc::default(),
+            scale: [1.0; 2],
+            rotation_degrees: 0.0,
+            offset: [0.0; 2],
+            channel: None,
+            invert: false,
+        };
+        Ok(LightDesc::Projector(ProjectorLightDesc {
+            position: map.translation.to_array(),
+            look_at: (map.translation + map.matrix3.z_axis.normalize_or_zero()).to_array(),
+            up: Some(map.matrix3.y_axis.to_array()),
+            texture: Some(draft.add_texture("projection", &params.place, texture)),
+            irradiance: [scale.max(0.0) as f32; 3],
+            vertical_fov_degrees: 2.0 * (half / aspect.min(1.0)).atan().to_degrees(),
+            aspect: Some(aspect),
+            group: None,
+        }))
     }
 
     /// The intensity of a light that gives `whole` of power for each unit of it.
@@ -134,7 +172,7 @@ impl Lights<'_> {
         let name = std::path::Path::new(file).file_stem().map_or_else(|| "sky".into(), |stem| stem.to_string_lossy());
         light.file = Some(draft.keep_environment(&name, sky));
         light.scale = scale.max(0.0) as f32;
-        light.transform = Some(matrix(&crate::math::DAffine3::from_mat3(rotation * pbrt_from_ours)));
+        light.transform = Some(matrix(&DAffine3::from_mat3(rotation * pbrt_from_ours)));
         Ok(light)
     }
 

@@ -3,7 +3,7 @@
 use super::*;
 use crate::desc::{
     ChannelDesc, ColorDesc, ColorSpaceDesc, LightDesc, MaterialDesc, OpacityDesc, RangedDesc, RoughnessDesc,
-    ScalarDesc, TextureDesc,
+    ScalarDesc, SubsurfaceMethodDesc, TextureDesc,
 };
 
 /// The material of a scene with one sphere of it.
@@ -229,6 +229,36 @@ fn numbers_of_images_are_alpha_where_it_matters() {
 }
 
 #[test]
+fn subsurface_is_a_random_walk() {
+    let principled = |rest: &str| {
+        let MaterialDesc::Principled(desc) = material(&format!("Material \"subsurface\" {rest}")) else { panic!() };
+        assert_eq!(desc.subsurface_method, SubsurfaceMethodDesc::RandomWalk);
+        assert!(matches!(desc.subsurface, ScalarDesc::Constant(1.0)));
+        let radius = desc.subsurface_radius.unwrap().to_array();
+        (*desc, radius)
+    };
+    let (desc, radius) = principled(
+        "\"rgb reflectance\" [0.8 0.5 0.2] \"rgb mfp\" [1 0.5 0.25] \"float scale\" 2 \"float roughness\" 0.0625",
+    );
+    let ColorDesc::Rgb(color) = desc.base_color else { panic!() };
+    assert!(close(color, [0.8, 0.5, 0.2]) && close(radius, [2.0, 1.0, 0.5]));
+    assert!(matches!(desc.ior, Some(RangedDesc::Constant(1.33))) && desc.subsurface_anisotropy.is_none());
+    let ScalarDesc::Constant(roughness) = desc.roughness else { panic!() };
+    assert!(close([roughness], [0.5]));
+    // Of coefficients: the mean free path of reduced scattering, and a colour that is white without absorption.
+    let (desc, radius) = principled("\"rgb sigma_a\" [1 0 3] \"rgb sigma_s\" [2 2 2] \"float g\" 0.5");
+    let ColorDesc::Rgb(color) = desc.base_color else { panic!() };
+    assert!(close(radius, [0.5, 1.0, 0.25]) && color[1] == 1.0 && color[2] < color[0] && color[0] < 0.5, "{color:?}");
+    assert_eq!(desc.subsurface_anisotropy, Some(0.5));
+    // Measured media; milk where nothing is given.
+    let (_, skin) = principled("\"string name\" \"Skin1\"");
+    assert!(close(skin, [1.0 / 0.772, 1.0 / 1.05, 1.0 / 1.49]));
+    assert_eq!(principled("").1, principled("\"string name\" \"Wholemilk\"").1);
+    let unknown = world("Material \"subsurface\" \"string name\" \"Tofu\" Shape \"sphere\"");
+    assert_eq!(outcome(&unknown, "Material", "name"), Outcome::Approximated);
+}
+
+#[test]
 fn constants_are_folded() {
     let text = "Texture \"a\" \"spectrum\" \"constant\" \"rgb value\" [0.2 0.4 0.6]
         Texture \"m\" \"spectrum\" \"mix\" \"texture tex1\" \"a\" \"rgb tex2\" [1 1 1] \"float amount\" 0.5
@@ -264,6 +294,28 @@ fn textured_meshes_without_uv_get_pbrts() {
     let imported = world(text);
     let ShapeDesc::Mesh(mesh) = shape(&imported) else { panic!() };
     assert_eq!((mesh.uvs.as_ref().unwrap().len(), mesh.positions.as_ref().unwrap().len()), (6, 6));
+}
+
+#[test]
+fn a_projection_is_a_projector() {
+    // Twice as wide as high: the angle is that from the lower to the upper edge.
+    let mut pfm = b"PF\n2 1\n-1\n".to_vec();
+    pfm.extend([1f32; 6].iter().flat_map(|x| x.to_le_bytes()));
+    let imported = read_with(
+        "WorldBegin Translate 1 2 3 LightSource \"projection\" \"string filename\" \"slide.pfm\" \"float fov\" 40 \
+         \"float scale\" 2",
+        &[("slide.pfm", &pfm)],
+    )
+    .unwrap();
+    let LightDesc::Projector(light) = &imported.desc.lights[0] else { panic!() };
+    assert_eq!((light.irradiance, light.aspect), ([2.0; 3], Some(2.0)));
+    assert!((light.vertical_fov_degrees - 40.0).abs() < 1e-9);
+    let [from, to] = [light.position, light.look_at].map(DVec3::from);
+    assert!(
+        (to - from).length() - 1.0 < 1e-9 && light.up.is_some_and(|up| DVec3::from(up).dot(to - from).abs() < 1e-9)
+    );
+    let TextureDesc::Image { file, .. } = &imported.desc.textures[light.texture.as_ref().unwrap()] else { panic!() };
+    assert_eq!(file, "slide.pfm");
 }
 
 #[test]

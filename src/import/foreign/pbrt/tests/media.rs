@@ -21,6 +21,17 @@ fn an_interface_between_media_is_invisible() {
 }
 
 #[test]
+fn presets_are_measured_media() {
+    let found = world(
+        "MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"string preset\" \"Marble\" \"float scale\" 10\n\
+         Material \"interface\"\nMediumInterface \"m\" \"\"\nShape \"sphere\"",
+    );
+    let medium = &found.desc.media["m"];
+    assert!(close(medium.absorption.to_array(), [0.021, 0.041, 0.071]));
+    assert!(close(medium.scattering.to_array(), [21.9, 26.2, 30.0]));
+}
+
+#[test]
 fn the_medium_of_the_camera_is_around_everything() {
     let text = format!("{SMOKE}MediumInterface \"\" \"smoke\"\nCamera \"perspective\"\nWorldBegin\nShape \"sphere\"");
     assert_eq!(read(&text).desc.medium.as_deref(), Some("smoke"));
