@@ -34,6 +34,7 @@ clouds          clouds          288x162  512
 fur             fur             288x180  256
 glossy          glossy          270x180  2048
 principled      principled      176x264  1024
+skin            skin            288x180  512
 textures        textures        288x144  1024
 tree            tree            240x240  256
 smooth_normals  smooth_normals  320x140  512

@@ -61,7 +61,7 @@ fn a_white_furnace_shows_no_wax() {
     for (rest, shapes) in [
         (json!({ "subsurface_radius": 0.3 }), ball()),
         (json!({ "subsurface_radius": [2, 0.2, 0.06], "subsurface_anisotropy": 0.8 }), ball()),
-        (json!({ "subsurface_radius": 1e-9 }), ball()),
+        (json!({ "subsurface_radius": 0.003 }), ball()),
         (json!({ "subsurface_radius": 0.2, "subsurface": 0.4, "clearcoat": 1 }), ball()),
         (json!({ "subsurface_radius": 0.4, "subsurface_scale": 0.5, "subsurface_anisotropy": -0.5 }), block(false)),
         (json!({ "subsurface_radius": 0.2 }), block(true)),
