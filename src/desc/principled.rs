@@ -35,8 +35,8 @@ least 1.05, and no texture for either."]
             clearcoat: scalar = 0.0,
             /// From a satin to a glossy coat. Default: 1.
             clearcoat_gloss: scalar = 1.0,
-            /// How much of the diffuse base's light is scattered below the surface, by `subsurface_method`: a flatter
-            /// lobe that resembles it, or in truth. Default: 0.
+            /// How much of what the diffuse base scatters is scattered below the surface: by `subsurface_method` a
+            /// flatter lobe that resembles it, or a random walk. Default: 0.
             subsurface: scalar = 0.0,
             /// How much of what is not metal is glass, whose inside is the side against the normal. Default: 0.
             transmission: scalar = 0.0,
