@@ -61,8 +61,7 @@ fn a_white_furnace_shows_no_wax() {
     for (rest, shapes) in [
         (json!({ "subsurface_radius": 0.3 }), ball()),
         (json!({ "subsurface_radius": [2, 0.2, 0.06], "subsurface_anisotropy": 0.8 }), ball()),
-        (json!({ "subsurface_radius": 0.003 }), ball()),
-        (json!({ "subsurface_radius": 0.2, "subsurface": 0.4, "clearcoat": 1 }), ball()),
+        (json!({ "subsurface_radius": 0.02 }), ball()),
         (json!({ "subsurface_radius": 0.4, "subsurface_scale": 0.5, "subsurface_anisotropy": -0.5 }), block(false)),
         (json!({ "subsurface_radius": 0.2 }), block(true)),
     ] {
@@ -74,11 +73,23 @@ fn a_white_furnace_shows_no_wax() {
             for channel in 0..3 {
                 let Estimate { mean, error } = Estimate::of(&image, channel);
                 // The albedo of the layer is from a table.
-                let bound = 5.5 * error + 2e-3;
+                let bound = 5.5 * error + 1e-3;
                 assert!((mean - 1.0).abs() < bound, "{rest} {strategy}, channel {channel}: {mean} +- {error}");
             }
         }
     }
+}
+
+#[test]
+fn shares_of_a_walk_add_up() {
+    let of_share = |share: f64| {
+        let grey = wax(&json!(0.5), json!({ "subsurface": share, "subsurface_radius": 0.2, "roughness": 0.8 }));
+        Estimate::of(&render(&furnace(&grey, ball())), 0)
+    };
+    let [diffuse, both, walk] = [0.0, 0.4, 1.0].map(of_share);
+    let (expected, error) = (0.6 * diffuse.mean + 0.4 * walk.mean, (0.4 * walk.error).hypot(0.6 * diffuse.error));
+    let bound = 5.5 * both.error.hypot(error) + 1e-4;
+    assert!((both.mean - expected).abs() < bound && walk.mean > diffuse.mean + 0.01, "{diffuse:?} {both:?} {walk:?}");
 }
 
 #[test]
@@ -95,8 +106,8 @@ fn flat_ground_has_the_base_color() {
         let (image, layer) = (render(&scene), layer(&wax, &ground));
         for (channel, color) in color.into_iter().enumerate() {
             let Estimate { mean, error } = Estimate::of(&image, channel);
-            // The similarity of anisotropic scattering to isotropic one is not exact.
-            let bound = 5.5 * error + if anisotropy == 0.0 { 4e-3 } else { 0.02 };
+            // What the formula is off by: the similarity of anisotropic scattering to isotropic one is not exact.
+            let bound = 5.5 * error + if anisotropy == 0.0 { 3e-3 } else { 1e-2 };
             assert!((mean - layer - color).abs() < bound, "{anisotropy}: {mean} +- {error}, {layer} {color}");
         }
     }
@@ -157,7 +168,7 @@ fn a_ball_is_as_bright_as_a_walk_within_it() {
             let error = estimate.error.hypot(walk_error);
             // Two-sided, 5.5 standard errors: a false alarm in 2e7.
             let off = estimate.mean - layer - expected;
-            assert!(off.abs() < 5.5 * error + 1e-3, "g {g}, channel {channel}: {estimate:?} - {layer}, {expected}");
+            assert!(off.abs() < 5.5 * error, "g {g}, channel {channel}: {estimate:?} - {layer}, {expected}");
         }
     }
 }
@@ -177,7 +188,7 @@ fn what_is_within_the_surface_is_not_there() {
         { "type": "sphere", "material": "wax", "transform": [{ "translate": [0.5, 0, 0] }] }
     ]);
     let Estimate { mean, error } = Estimate::of(&render(&furnace(&white, two)), 0);
-    assert!((mean - 1.0).abs() < 5.5 * error + 2e-3, "{mean} +- {error}");
+    assert!((mean - 1.0).abs() < 5.5 * error + 1e-3, "{mean} +- {error}");
 }
 
 #[test]

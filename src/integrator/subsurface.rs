@@ -52,8 +52,8 @@ impl SubsurfaceShapes {
         let is_one: Vec<bool> = scene.surfaces.iter().map(has_walk).collect();
         let bounds = bounds_of(scene, |id| is_one[id.index()]);
         // A flat surface has an inside, too.
-        let bounds = bounds.grown(f64::from(bounds.size().max_element()));
-        Self { is_one, bounds }
+        let around = Vec3::splat(bounds.size().max_element());
+        Self { is_one, bounds: Aabb { min: bounds.min - around, max: bounds.max + around } }
     }
 
     fn contains(&self, shape: ShapeId) -> bool {
