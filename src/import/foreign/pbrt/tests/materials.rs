@@ -299,12 +299,12 @@ fn textured_meshes_without_uv_get_pbrts() {
 #[test]
 fn a_projection_is_a_projector() {
     // Twice as wide as high: the angle is that from the lower to the upper edge.
-    let mut pfm = b"PF\n2 1\n-1\n".to_vec();
-    pfm.extend([1f32; 6].iter().flat_map(|x| x.to_le_bytes()));
+    let mut png = std::io::Cursor::new(Vec::new());
+    image::write_buffer_with_format(&mut png, &[9, 9], 2, 1, image::ColorType::L8, image::ImageFormat::Png).unwrap();
     let imported = read_with(
-        "WorldBegin Translate 1 2 3 LightSource \"projection\" \"string filename\" \"slide.pfm\" \"float fov\" 40 \
+        "WorldBegin Translate 1 2 3 LightSource \"projection\" \"string filename\" \"slide.png\" \"float fov\" 40 \
          \"float scale\" 2",
-        &[("slide.pfm", &pfm)],
+        &[("slide.png", png.get_ref())],
     )
     .unwrap();
     let LightDesc::Projector(light) = &imported.desc.lights[0] else { panic!() };
@@ -312,10 +312,10 @@ fn a_projection_is_a_projector() {
     assert!((light.vertical_fov_degrees - 40.0).abs() < 1e-9);
     let [from, to] = [light.position, light.look_at].map(DVec3::from);
     assert!(
-        (to - from).length() - 1.0 < 1e-9 && light.up.is_some_and(|up| DVec3::from(up).dot(to - from).abs() < 1e-9)
+        ((to - from).length() - 1.0).abs() < 1e-9 && light.up.is_some_and(|up| DVec3::from(up).dot(to - from).abs() < 1e-9)
     );
     let TextureDesc::Image { file, .. } = &imported.desc.textures[light.texture.as_ref().unwrap()] else { panic!() };
-    assert_eq!(file, "slide.pfm");
+    assert_eq!(file, "slide.png");
 }
 
 #[test]
