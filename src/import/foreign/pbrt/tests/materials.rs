@@ -312,7 +312,8 @@ fn a_projection_is_a_projector() {
     assert!((light.vertical_fov_degrees - 40.0).abs() < 1e-9);
     let [from, to] = [light.position, light.look_at].map(DVec3::from);
     assert!(
-        ((to - from).length() - 1.0).abs() < 1e-9 && light.up.is_some_and(|up| DVec3::from(up).dot(to - from).abs() < 1e-9)
+        ((to - from).length() - 1.0).abs() < 1e-9
+            && light.up.is_some_and(|up| DVec3::from(up).dot(to - from).abs() < 1e-9)
     );
     let TextureDesc::Image { file, .. } = &imported.desc.textures[light.texture.as_ref().unwrap()] else { panic!() };
     assert_eq!(file, "slide.png");
