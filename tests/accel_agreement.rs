@@ -1,8 +1,8 @@
 //! Embree answers alike alone, in packets and from many threads, and any-hit queries as closest-hit ones do.
 
-use steradian::accel::{Accelerator, Coherence, EmbreeAccel, EmbreeInfo, LinearAccel};
-use steradian::geometry::{Geometry, Shape};
-use steradian::math::{DVec3, Ray};
+use steradian::internal::accel::{Accelerator, Coherence, EmbreeAccel, EmbreeInfo, LinearAccel};
+use steradian::internal::geometry::{Geometry, Shape};
+use steradian::internal::math::{DVec3, Ray};
 
 use crate::util::geometry::{Rng, instances, meshes, placed_analytic_shapes, soup, transform};
 use crate::util::scenes::{camera_rays, same, scenes, test_rays};

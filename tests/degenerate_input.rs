@@ -1,13 +1,13 @@
 //! Rays and instances at the end of what is one; the stability checks of group E have what is none.
 
 use serde_json::{Value, json};
-use steradian::accel::{AccelKind, Accelerator, EmbreeAccel, EmbreeInfo, build};
-use steradian::compile;
-use steradian::geometry::Shape;
-use steradian::import::{ImportOptions, read_scene};
-use steradian::math::float::SMALLEST_NORMAL;
-use steradian::math::{DMat3, DVec3, Ray, Vec3};
-use steradian::render::{Overrides, Settings};
+use steradian::internal::accel::{AccelKind, Accelerator, EmbreeAccel, EmbreeInfo, build};
+use steradian::internal::compile;
+use steradian::internal::geometry::Shape;
+use steradian::internal::import::{ImportOptions, read_scene};
+use steradian::internal::math::float::SMALLEST_NORMAL;
+use steradian::internal::math::{DMat3, DVec3, Ray, Vec3};
+use steradian::internal::render::{Overrides, Settings};
 
 use crate::util::folder::Folder;
 use crate::util::geometry::{Rng, cube, instances, meshes, placed_analytic_shapes, soup, transform, triangle};

@@ -2,15 +2,16 @@
 
 use std::path::Path;
 
-use steradian::accel::inspect::{StructureStats, TraversalCounts};
-use steradian::accel::{AccelKind, Accelerator, LinearAccel, build};
-use steradian::bench::{bumpy_sphere, record};
-use steradian::geometry::{Analytic, Disk, Geometry, Hit, Mesh, Shape, Sphere, TransformedShape};
-use steradian::math::{DMat3, DVec3, Ray};
-use steradian::render::{Overrides, Settings};
-use steradian::{compile, import};
+use steradian::internal::accel::inspect::{StructureStats, TraversalCounts};
+use steradian::internal::accel::{AccelKind, Accelerator, LinearAccel, build};
+use steradian::internal::geometry::{Analytic, Disk, Geometry, Hit, Mesh, Shape, Sphere, TransformedShape};
+use steradian::internal::math::{DMat3, DVec3, Ray};
+use steradian::internal::render::{Overrides, Settings};
+use steradian::internal::{compile, import};
+use steradian_bench::{bumpy_sphere, record};
 
 use crate::util::geometry::{Rng, cube, grid, mesh, meshes, ray, ray_through, transform, world};
+use crate::util::root;
 use crate::util::scenes::{all, own, path_rays, same, scenes, test_rays};
 
 fn assert_equal(name: &str, geometry: &Geometry, accels: &[(&str, Box<dyn Accelerator + '_>)], rays: &[Ray]) -> usize {
@@ -44,7 +45,7 @@ fn answers_equal_the_oracles_bit_for_bit() {
 /// The rays of renders of the project's scenes; Embree's answers are the same surface within rounding.
 fn agree_on_renders(count: usize) {
     for name in ["cornell", "glass", "gallery", "knot", "motion", "textures"] {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).with_extension("json");
+        let file = root().join("scenes").join(name).with_extension("json");
         let desc = import::load_scene(&file).unwrap();
         let settings =
             Settings::new(&desc, &Overrides { default_outputs: vec!["a.exr".into()], ..Overrides::default() }).unwrap();

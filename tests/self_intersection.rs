@@ -1,8 +1,8 @@
 //! Rays that leave a triangle do not find it again, however large or small it is; more of it is in group B of the
 //! stability catalogue.
 
-use steradian::accel::EmbreeAccel;
-use steradian::id::PrimId;
+use steradian::internal::accel::EmbreeAccel;
+use steradian::internal::id::PrimId;
 
 use crate::util::geometry::{Rng, closest, meshes, ray_through, triangle};
 
@@ -14,7 +14,7 @@ fn a_triangle_of_any_size_is_not_hit_again() {
         let size = rng.magnitude(-8.0, 8.0);
         let mesh = triangle(rng.cube() * size, rng.cube() * size, rng.cube() * size);
         let points = mesh.triangle_points(PrimId(0));
-        let [a, b, c] = [points.a, points.b, points.c].map(steradian::math::Vec3::as_dvec3);
+        let [a, b, c] = [points.a, points.b, points.c].map(steradian::internal::math::Vec3::as_dvec3);
         let geometry = meshes(vec![mesh]);
         let accel = EmbreeAccel::new(&geometry, 1).expect("Embree builds");
         for _ in 0..100 {

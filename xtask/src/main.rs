@@ -27,7 +27,7 @@ usage: cargo xtask NAME [ARGUMENT...]
   light_choice         compare light tree and power sampling at equal time: [SCENE.json] [--spp N] [--rounds N]
   make_meshes          meshes and sky of scenes/, and scenes/shrine.json
   make_textures        textures of scenes/
-  make_vectors         exact test vectors of shapes: src/bench/stability/vectors
+  make_vectors         exact test vectors of shapes: crates/bench/src/stability/vectors
   mutants              inject faults, check that tests find them: [NAME...]
   texture_filtering    error and time of texture lookups
 ";

@@ -1,4 +1,4 @@
-//! Accelerators compared on the same rays: record, replay, check, report; error against time; cost as scenes grow; and
+//! Benchmarks of the renderer Steradian: accelerators compared on the same rays: record, replay, check, report; error against time; cost as scenes grow; and
 //! numerical stability.
 
 pub mod agreement;
@@ -16,6 +16,13 @@ mod reports;
 pub mod scale;
 mod scaling;
 pub mod stability;
+
+// The parts of the renderer that are compared and checked.
+use steradian::desc;
+use steradian::internal::{
+    accel, assets, bsdf, camera, color, compile, film, geometry, id, import, integrator, light, math, output,
+    printable, render, sampling, scene,
+};
 
 pub use machine::Machine;
 pub use measure::{AccelReport, BuildReport, KindReport, Mode, Options, RateReport, SceneReport, bench_scene};

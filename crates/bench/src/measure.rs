@@ -10,10 +10,10 @@ use super::machine::{memory_in_use, reset_peak_memory};
 use super::{RayKind, RaySet, Watch, epo, median_and_range};
 use crate::accel::inspect::{Inspect, StructureStats, TraversalCounts};
 use crate::accel::{self, AccelKind, Accelerator, Coherence, HitRows, LinearAccel};
-use crate::error::{Error, Result};
 use crate::geometry::Geometry;
 use crate::math::rows::BATCH;
 use crate::math::{Ray, RayRows};
+use steradian::{Error, Result};
 
 /// Options of a benchmark.
 #[derive(Clone, Debug)]

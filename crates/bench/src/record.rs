@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 use super::observed::{Call, Observed, Observer};
 use crate::accel::{Accelerator, Coherence};
 use crate::desc::IntegratorDesc;
-use crate::error::Result;
 use crate::film::Crop;
 use crate::math::Ray;
 use crate::render::{self, Settings, Silent};
 use crate::scene::Scene;
+use steradian::Result;
 
 /// Rays that belong together: neighbours of a packet.
 const RUN: usize = 16;

@@ -10,10 +10,10 @@ use super::naive::{MatrixLinear, NaiveBvh, NaiveKdTree, NaiveOctree};
 use super::{Machine, Watch};
 use crate::accel::inspect::TraversalCounts;
 use crate::accel::{self, AccelKind, Accelerator};
-use crate::error::Result;
 use crate::geometry::{Geometry, Mesh};
 use crate::math::Ray;
 use frames::{FrameBenchmark, Kind, measure};
+use steradian::Result;
 
 /// How much is done.
 #[derive(Clone, Copy, Debug)]
@@ -322,7 +322,7 @@ fn compare(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::Unwatched;
+    use crate::Unwatched;
 
     #[test]
     fn every_accelerator_draws_the_same_picture_and_trees_test_less() {

@@ -6,8 +6,8 @@ use serde::Serialize;
 
 use super::{Options, Watch, median_and_range, mesh::sphere_geometry};
 use crate::accel::{self, AccelKind};
-use crate::error::Result;
 use crate::math::{Ray, Vec3};
+use steradian::Result;
 
 /// Rays for each number of triangles.
 const RAYS: usize = 200_000;

@@ -5,15 +5,16 @@ use std::io::Write;
 use std::path::Path;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use steradian::accel::{self, AccelKind};
-use steradian::bench::agreement::{describe, parse_ray};
-use steradian::bench::report::Report;
-use steradian::bench::stability::{self, CheckReport, Effort, StabilityReport};
-use steradian::bench::{
+use steradian::internal::accel::{self, AccelKind};
+use steradian::internal::compile;
+use steradian::internal::render::{Overrides, Settings};
+use steradian::{Error, Result};
+use steradian_bench::agreement::{describe, parse_ray};
+use steradian_bench::report::Report;
+use steradian_bench::stability::{self, CheckReport, Effort, StabilityReport};
+use steradian_bench::{
     Machine, Options, ReportsOptions, SceneReport, Watch, bench_reports, bench_scaling, bench_scene, record,
 };
-use steradian::render::{Overrides, Settings};
-use steradian::{Error, Result, compile};
 
 use crate::args::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityArgs, Verbosity};
 use crate::interrupt::Interrupt;
@@ -87,7 +88,7 @@ fn accel(arguments: &BenchAccelArgs) -> Result<u8> {
 /// Makes a folder for results: a slip in its name is found before the work, not after it.
 fn check_folder(folder: &Path, file: &str) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::Output { file: folder.to_owned(), message: e.to_string() })?;
-    steradian::output::check_creatable(&folder.join(file))
+    steradian::internal::output::check_creatable(&folder.join(file))
 }
 
 fn reports(arguments: &BenchReportsArgs) -> Result<u8> {
@@ -210,7 +211,7 @@ pub struct Steps<'a> {
 
 impl Watch for Steps<'_> {
     fn step(&self, what: &str) {
-        let what = steradian::farm::message_line(what);
+        let what = steradian::internal::farm::message_line(what);
         if self.lines {
             // Stderr may be gone; that is no reason to stop.
             let _ = writeln!(std::io::stderr(), "{what}");

@@ -5,11 +5,12 @@ use std::path::Path;
 
 use serde::Serialize;
 use serde_json::Value;
-use steradian::bench::Watch;
-use steradian::bench::error::{Budget, ErrorOptions, External, Standard, Subject, Variant, bench_error};
 use steradian::desc::SceneDesc;
-use steradian::render::{Overrides, Settings};
-use steradian::{Error, Result, compile, output};
+use steradian::internal::render::{Overrides, Settings};
+use steradian::internal::{compile, output};
+use steradian::{Error, Result};
+use steradian_bench::Watch;
+use steradian_bench::error::{Budget, ErrorOptions, External, Standard, Subject, Variant, bench_error};
 
 use crate::args::{BenchErrorArgs, Verbosity};
 use crate::bench::{Steps, command_line, spinner};

@@ -4,9 +4,10 @@ use std::io::{IsTerminal, Read};
 use std::num::NonZero;
 use std::process::Command;
 
-use steradian::bench::Watch;
-use steradian::bench::scale::{Case, ScaleOptions, bench_scale, run_case};
-use steradian::{Error, Result, output};
+use steradian::internal::output;
+use steradian::{Error, Result};
+use steradian_bench::Watch;
+use steradian_bench::scale::{Case, ScaleOptions, bench_scale, run_case};
 
 use crate::args::BenchScaleArgs;
 use crate::bench::{Steps, command_line, spinner};

@@ -1,7 +1,7 @@
 //! `steradian check-exr`.
 
 use serde_json::{Value, json};
-use steradian::output::{self, Finding, Severity};
+use steradian::internal::output::{self, Finding, Severity};
 use steradian::{Error, Result};
 
 use crate::args::CheckExrArgs;

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use serde_json::{Value, json};
-use steradian::film::Image;
-use steradian::output::{self, Format};
+use steradian::internal::film::Image;
+use steradian::internal::output::{self, Format};
 use steradian::{Error, Result};
 
 use crate::args::CompareArgs;

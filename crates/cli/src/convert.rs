@@ -1,8 +1,8 @@
 //! `steradian convert`.
 
 use steradian::Result;
-use steradian::convert::{self, Originals};
-use steradian::output::FileUses;
+use steradian::internal::convert::{self, Originals};
+use steradian::internal::output::FileUses;
 
 use crate::args::{ConvertArgs, Verbosity};
 use crate::log::{self, Level};

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use steradian::denoise::{Denoiser, FileOptions, Report, denoise_file};
-use steradian::film::Filter;
-use steradian::output::{self, FileUses, Format};
+use steradian::internal::denoise::{Denoiser, FileOptions, Report, denoise_file};
+use steradian::internal::film::Filter;
+use steradian::internal::output::{self, FileUses, Format};
 use steradian::{Error, Result};
 
 use crate::args::DenoiseArgs;

@@ -7,9 +7,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use clap::Parser;
-use steradian::farm::{Job, SlurmOptions, is_scene_per_frame, openjd_template, slurm_scripts, with_frame_pattern};
-use steradian::output::{self, FileUses, Format};
-use steradian::{Error, Result, printable};
+use steradian::internal::farm::{
+    Job, SlurmOptions, is_scene_per_frame, openjd_template, slurm_scripts, with_frame_pattern,
+};
+use steradian::internal::output::{self, FileUses, Format};
+use steradian::internal::printable;
+use steradian::{Error, Result};
 
 use crate::args::{Cli, FarmCommand, JobArgs, SlurmArgs};
 use crate::log::{self, Level};

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use steradian::Result;
 use steradian::desc::OutputDesc;
-use steradian::farm::{file_of_frame, scene_of_frame, with_frame_pattern};
-use steradian::import::files_of_scene;
-use steradian::output::{FileUses, files_of_output};
+use steradian::internal::farm::{file_of_frame, scene_of_frame, with_frame_pattern};
+use steradian::internal::import::files_of_scene;
+use steradian::internal::output::{FileUses, files_of_output};
 
 #[cfg(feature = "bench")]
 use crate::args::BenchCommand;

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use steradian::farm::{FrameList, file_of_frame, is_scene_per_frame, scene_of_frame, with_frame_pattern};
-use steradian::import::{self, ImportReport, Imported};
-use steradian::output::FileUses;
-use steradian::render::Settings;
+use steradian::internal::farm::{FrameList, file_of_frame, is_scene_per_frame, scene_of_frame, with_frame_pattern};
+use steradian::internal::import::{self, ImportReport, Imported};
+use steradian::internal::output::FileUses;
+use steradian::internal::render::Settings;
 use steradian::{Error, Result};
 
 use crate::args::RenderArgs;

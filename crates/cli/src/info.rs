@@ -1,11 +1,12 @@
 //! `steradian info`.
 
 use serde_json::{Value, json};
-use steradian::compile::Summary;
 use steradian::desc::{CameraKindDesc, SceneDesc};
-use steradian::render::{Overrides, Settings, film_bytes_per_pixel};
-use steradian::scene::Scene;
-use steradian::{Error, Result, compile};
+use steradian::internal::compile;
+use steradian::internal::compile::Summary;
+use steradian::internal::render::{Overrides, Settings, film_bytes_per_pixel};
+use steradian::internal::scene::Scene;
+use steradian::{Error, Result};
 
 use crate::args::InfoArgs;
 use crate::scene;

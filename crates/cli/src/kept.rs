@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-use steradian::render::{Overrides, Progress};
+use steradian::internal::render::{Overrides, Progress};
 use steradian::{Error, Result};
 
 use crate::args::StateArgs;

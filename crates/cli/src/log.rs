@@ -8,7 +8,7 @@ use std::sync::{Mutex, OnceLock};
 
 use indicatif::ProgressBar;
 use serde_json::json;
-use steradian::farm::message_line;
+use steradian::internal::farm::message_line;
 use steradian::{Error, Result};
 use tracing::field::{Field, Visit};
 use tracing_subscriber::Layer;
@@ -84,7 +84,7 @@ pub fn start(arguments: &LogArgs, verbosity: Verbosity, default_format: LogForma
                 let message = "is not a log of steradian, to which messages could be added; choose another name";
                 return Err(Error::Usage(format!("--log-file: {} {message}", path.display())));
             }
-            let file = steradian::file::append(path)?;
+            let file = steradian::internal::file::append(path)?;
             Some((Mutex::new(file), shown.max(Level::Info)))
         }
     };
@@ -106,7 +106,7 @@ pub fn start(arguments: &LogArgs, verbosity: Verbosity, default_format: LogForma
 /// somebody needs.
 fn is_log(path: &Path) -> std::io::Result<bool> {
     let mut start = Vec::new();
-    steradian::file::open(path)?.take(64).read_to_end(&mut start)?;
+    steradian::internal::file::open(path)?.take(64).read_to_end(&mut start)?;
     let separator = |i: usize| {
         [(4, b'-'), (7, b'-'), (10, b'T'), (13, b':'), (16, b':')].into_iter().find(|(place, _)| *place == i)
     };

@@ -35,8 +35,9 @@ use std::process::ExitCode;
 
 use clap::CommandFactory;
 use steradian::desc::SceneDesc;
-use steradian::output::FileUses;
-use steradian::{Error, ErrorKind, Result, import};
+use steradian::internal::import;
+use steradian::internal::output::FileUses;
+use steradian::{Error, ErrorKind, Result};
 
 use args::{Cli, Command, ConfigCommand};
 use log::Level;

@@ -16,8 +16,8 @@ use std::time::Duration;
 use rustix::mm::{MapFlags, ProtFlags, mmap_anonymous, munmap};
 use signal_hook::consts::SIGABRT;
 use signal_hook::low_level::{emulate_default_handler, register};
-use steradian::accel::on_uncaught_exception;
-use steradian::memory::is_fallible;
+use steradian::internal::accel::on_uncaught_exception;
+use steradian::internal::memory::is_fallible;
 
 use crate::log;
 

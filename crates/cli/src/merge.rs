@@ -3,10 +3,10 @@
 use std::path::{Component, Path};
 
 use steradian::desc::OutputDesc;
-use steradian::farm::check_single_name;
-use steradian::film::Image;
-use steradian::output::{self, FileUses, Format, RenderInfo, RenderStatistics};
-use steradian::render::{self, Header};
+use steradian::internal::farm::check_single_name;
+use steradian::internal::film::Image;
+use steradian::internal::output::{self, FileUses, Format, RenderInfo, RenderStatistics};
+use steradian::internal::render::{self, Header};
 use steradian::{Error, Result};
 
 use crate::args::MergeArgs;

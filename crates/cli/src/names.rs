@@ -100,7 +100,7 @@ fn values<T: JsonSchema>(names: &'static [&'static str]) -> Vec<PossibleValue> {
 mod tests {
     use super::*;
     use steradian::desc::{IntegratorDesc, SamplerKindDesc};
-    use steradian::film::LayerInfo;
+    use steradian::internal::film::LayerInfo;
 
     #[test]
     fn every_value_has_a_description() {

@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use steradian::farm::{Event, ProgressFormat, Status};
-use steradian::render::Progress;
+use steradian::internal::farm::{Event, ProgressFormat, Status};
+use steradian::internal::render::Progress;
 
 use crate::log::{self, Level};
 
@@ -85,7 +85,8 @@ impl Reporter {
             stop_reported: false,
             bar: None,
         };
-        let format = format.or_else(|| ProgressFormat::by_name("plain")).unwrap_or(&steradian::farm::FORMATS[0]);
+        let format =
+            format.or_else(|| ProgressFormat::by_name("plain")).unwrap_or(&steradian::internal::farm::FORMATS[0]);
         Self { sink, format, stop: OnceLock::new(), done: AtomicU64::new(0), state: Mutex::new(state) }
     }
 

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use serde_json::Value;
-use steradian::compile::CheckedScene;
-use steradian::farm::check_single_name;
-use steradian::live::{Fan, Live};
-use steradian::output;
-use steradian::render::{self, Progress, RenderProvenance, Replayed, Settings, Stats, TrainedGuide};
+use steradian::internal::compile::CheckedScene;
+use steradian::internal::farm::check_single_name;
+use steradian::internal::live::{Fan, Live};
+use steradian::internal::output;
+use steradian::internal::render::{self, Progress, RenderProvenance, Replayed, Settings, Stats, TrainedGuide};
 use steradian::{
     PreparedRender, Renderer, Rendering, Result, StateOptions, StopHandle, Watch, changed_settings, default_outputs,
 };

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Parser;
 use steradian::desc::OutputDesc;
-use steradian::farm::is_scene_per_frame;
-use steradian::import::scene_fingerprint;
-use steradian::output::{self, FileUses, Format};
-use steradian::render::{RenderProvenance, SequenceFrame, Settings};
+use steradian::internal::farm::is_scene_per_frame;
+use steradian::internal::import::scene_fingerprint;
+use steradian::internal::output::{self, FileUses, Format};
+use steradian::internal::render::{RenderProvenance, SequenceFrame, Settings};
 use steradian::{Error, Result};
 
 use crate::args::{Cli, Command, RenderArgs, RerenderArgs};

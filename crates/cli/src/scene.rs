@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use steradian::import::{self, Imported, Outcome, ReportEntry};
-use steradian::output::{self, FileUses};
+use steradian::internal::import::{self, Imported, Outcome, ReportEntry};
+use steradian::internal::output::{self, FileUses};
 use steradian::{Error, Result};
 
 use crate::args::{ImportArgs, Verbosity};
@@ -91,7 +91,7 @@ fn line(entry: &ReportEntry) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use steradian::import::Draft;
+    use steradian::internal::import::Draft;
 
     #[test]
     fn our_own_scenes_need_no_report_and_others_a_short_one() {

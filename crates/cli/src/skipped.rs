@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use steradian::desc::OutputDesc;
-use steradian::farm::FrameList;
-use steradian::output::{self, Format};
-use steradian::render::{Progress, RenderProvenance, Settings};
+use steradian::internal::farm::FrameList;
+use steradian::internal::output::{self, Format};
+use steradian::internal::render::{Progress, RenderProvenance, Settings};
 use steradian::{changed_settings, default_outputs};
 
 use crate::args::RenderArgs;

@@ -3,8 +3,9 @@
 use std::io::{ErrorKind, Write};
 
 use serde_json::Value;
-use steradian::farm::message_lines;
-use steradian::{Error, Result, printable};
+use steradian::internal::farm::message_lines;
+use steradian::internal::printable;
+use steradian::{Error, Result};
 
 /// Prints a line or several, in which names of strangers steer no terminal and no farm.
 pub fn print(text: &str) -> Result<()> {

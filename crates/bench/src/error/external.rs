@@ -7,9 +7,9 @@ use std::sync::atomic::AtomicBool;
 use serde_json::Value;
 
 use super::plan::{Budget, Measured};
-use crate::bench::child::{self, Ended};
-use crate::error::{Error, Result};
+use crate::child::{self, Ended};
 use crate::output::read_exr;
+use steradian::{Error, Result};
 
 /// A command that renders the scene into an EXR file.
 #[derive(Clone, Debug, PartialEq)]

@@ -23,10 +23,10 @@ use std::sync::atomic::AtomicBool;
 use self::bias::Blocks;
 use self::plan::{Measured, Program};
 use super::{Machine, Watch};
-use crate::error::{Error, Result};
 use crate::film::Image;
 use crate::output::{Comparison, compare};
 use crate::scene::Scene;
+use steradian::{Error, Result};
 
 /// Seeds of repeats follow one another; those of the halves that stand in for a reference are this far away.
 const HALVES_SEED: u64 = 1 << 32;

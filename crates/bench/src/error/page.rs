@@ -9,11 +9,11 @@ use half::f16;
 use serde::Serialize;
 
 use super::ErrorReport;
-use crate::bench::report::html;
-use crate::bench::report::plot::{self, Curve};
-use crate::error::{Error, Result};
 use crate::film::{Image, LayerKind};
 use crate::output::RELATIVE_FLOOR;
+use crate::report::html;
+use crate::report::plot::{self, Curve};
+use steradian::{Error, Result};
 
 /// Pixels of all pictures of a page; beyond it only those of the largest budget are in it.
 const PIXELS: u64 = 12_000_000;

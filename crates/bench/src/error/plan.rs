@@ -9,10 +9,10 @@ use serde::Serialize;
 
 use super::External;
 use crate::accel::{self, AccelKind, Accelerator};
-use crate::error::Result;
 use crate::film::Image;
 use crate::render::{self, Settings, Silent};
 use crate::scene::Scene;
+use steradian::Result;
 
 /// A render may turn out this many times as fast as its first sample before the number of samples ends it and not the
 /// time.

@@ -4,10 +4,10 @@ use std::fmt::Write;
 use std::path::Path;
 
 use super::{ErrorReport, Point, TaxReport};
-use crate::bench::report::csv::field;
-use crate::bench::report::markdown::{self, Table, number, range};
-use crate::bench::report::write_files;
-use crate::error::{Error, Result};
+use crate::report::csv::field;
+use crate::report::markdown::{self, Table, number, range};
+use crate::report::write_files;
+use steradian::{Error, Result};
 
 /// The columns of the CSV file.
 const COLUMNS: &str = "scene,variant,budget,repeat,seed,spp,seconds,process_seconds,relmse,relmse_trimmed,mse,flip,\

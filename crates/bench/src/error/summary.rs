@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::bias::Blocks;
 use super::plan::{ErrorOptions, Subject};
 use super::{Budget, Pictures, TaxReport};
-use crate::bench::{Machine, fitted_slope, median_and_range};
+use crate::{Machine, fitted_slope, median_and_range};
 
 /// Everything that a run has found.
 #[derive(Clone, Debug, Serialize)]

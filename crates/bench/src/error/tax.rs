@@ -8,12 +8,12 @@ use serde::Serialize;
 
 use super::plan::{ErrorOptions, Subject};
 use crate::accel::{AccelKind, Accelerator, EmbreeAccel, EmbreeOptions, EmbreeReplay};
-use crate::bench::observed::{Call, Observed, Observer};
-use crate::bench::{Watch, median_and_range};
-use crate::error::{Error, Result};
 use crate::film::Crop;
+use crate::observed::{Call, Observed, Observer};
 use crate::render::{self, Settings, Silent};
 use crate::scene::Scene;
+use crate::{Watch, median_and_range};
+use steradian::{Error, Result};
 
 /// Rays that are kept at most, about; each takes 50 bytes or more.
 const RAYS: u64 = 12_000_000;

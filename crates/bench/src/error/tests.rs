@@ -1,7 +1,7 @@
 use super::*;
 use crate::accel::{Accelerator, Coherence, EmbreeAccel, EmbreeReplay};
-use crate::bench::mesh::sphere_geometry;
 use crate::math::{Ray, Rng, Vec3};
+use crate::mesh::sphere_geometry;
 
 fn picture(size: [u32; 2], mut value: impl FnMut(usize) -> f32) -> Image {
     let data = (0..size[0] as usize * size[1] as usize).flat_map(|i| [value(i); 4]).collect();

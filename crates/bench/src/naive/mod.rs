@@ -128,8 +128,8 @@ impl<T: MeshTree> Accelerator for Forest<'_, T> {
 mod tests {
     use super::*;
     use crate::accel::LinearAccel;
-    use crate::bench::mesh::{bumpy_sphere, head};
     use crate::math::Vec3;
+    use crate::mesh::{bumpy_sphere, head};
 
     fn rays() -> Vec<Ray> {
         let at = |i: usize| (i as f32 + 0.5) / 30.0 * 3.0 - 1.5;
@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn the_wrong_range_of_leaves_loses_only_the_first_leaf() {
-        let geometry = crate::bench::mesh::sphere_geometry(968);
+        let geometry = crate::mesh::sphere_geometry(968);
         let (right, wrong) = (NaiveBvh::new(&geometry), NaiveBvh::with_wrong_leaves(&geometry));
         let lost = rays().iter().filter(|ray| right.intersect(ray) != wrong.intersect(ray)).count();
         let hits = rays().iter().filter(|ray| right.occluded(ray)).count();

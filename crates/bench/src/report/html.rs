@@ -5,9 +5,9 @@ use std::fmt::Write;
 use super::Report;
 use super::markdown::{self, Table};
 use super::plot::{self, Curve, Series};
-use crate::bench::{Mode, RayKind, SceneReport};
-use crate::error::Result;
 use crate::printable;
+use crate::{Mode, RayKind, SceneReport};
+use steradian::Result;
 
 const STYLE: &str = "
 :root { color-scheme: light dark; --line: #8884; }
@@ -52,7 +52,7 @@ pub fn write(report: &Report) -> Result<String> {
     }
     if let (Some(scaling), Some(table)) = (&report.scaling, markdown::scaling(report)) {
         let names: Vec<&String> = scaling.slopes.iter().map(|(name, ..)| name).collect();
-        let curve = |name: &str, slope: f64, cost: fn(&crate::bench::ScalingPoint) -> f64| Curve {
+        let curve = |name: &str, slope: f64, cost: fn(&crate::ScalingPoint) -> f64| Curve {
             name: format!("{name} (slope {slope:.2})"),
             points: scaling.points.iter().filter(|p| p.accel == name).map(|p| (p.triangles as f64, cost(p))).collect(),
         };

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::Report;
-use crate::bench::{AccelReport, Mode, SceneReport};
+use crate::{AccelReport, Mode, SceneReport};
 
 /// A table by its heads and rows.
 pub struct Table {
@@ -83,7 +83,7 @@ fn rates(scene: &SceneReport) -> Table {
     Table { title: "Mrays/s: median (lowest to highest)".into(), heads: names.map(str::to_owned).collect(), rows }
 }
 
-fn rate(accel: &AccelReport, kind: crate::bench::RayKind, mode: Mode, threads: usize) -> Option<String> {
+fn rate(accel: &AccelReport, kind: crate::RayKind, mode: Mode, threads: usize) -> Option<String> {
     let report = accel.kinds.iter().find(|k| k.kind == kind)?;
     let rate = report.rates.iter().find(|r| r.mode == mode && r.threads == threads)?;
     let [median, low, high] = rate.mrays_per_second;

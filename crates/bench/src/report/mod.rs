@@ -11,7 +11,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::{Machine, ScalingReport, SceneReport};
-use crate::error::{Error, Result};
+use steradian::{Error, Result};
 
 /// Everything a benchmark of accelerators has found.
 #[derive(Clone, Debug, Serialize)]

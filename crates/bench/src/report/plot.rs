@@ -4,7 +4,7 @@ use plotters::coord::CoordTranslate;
 use plotters::prelude::*;
 
 use crate::accel::AccelKind;
-use crate::error::{Error, Result};
+use steradian::{Error, Result};
 
 const SIZE: (u32, u32) = (960, 420);
 

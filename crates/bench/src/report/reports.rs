@@ -7,8 +7,8 @@ use super::html::{self, add_table, escape, figure};
 use super::markdown::{self, Table, range};
 use super::plot::{self, Series};
 use super::write_files;
-use crate::bench::{Comparison, ComparisonRow, ReportsReport};
-use crate::error::{Error, Result};
+use crate::{Comparison, ComparisonRow, ReportsReport};
+use steradian::{Error, Result};
 
 const TITLE: &str = "What reports say of accelerators, repeated";
 
@@ -126,7 +126,7 @@ fn table(comparison: &Comparison) -> Table {
         times_faster(comparison, |row| row.paths.accel_seconds),
     ];
     let rows = comparison.rows.iter().enumerate().map(|(i, row)| {
-        let frame = |timing: &crate::bench::FrameTiming| {
+        let frame = |timing: &crate::FrameTiming| {
             let scaled = timing.scaled_from.map_or(String::new(), |[w, h]| format!(", from {w}x{h}"));
             format!("{}{scaled}", range(timing.frame_seconds))
         };

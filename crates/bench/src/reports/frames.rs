@@ -9,17 +9,17 @@ use serde_json::json;
 
 use super::{Entry, FrameTiming, ReportsOptions};
 use crate::accel::{self, AccelKind, Accelerator};
-use crate::bench::observed::{Call, Observed, Observer};
-use crate::bench::{Watch, median_and_range};
 use crate::compile;
 use crate::desc::SceneDesc;
-use crate::error::Result;
 use crate::film::{Image, LayerKind};
 use crate::geometry::Mesh;
 use crate::import::parse_scene;
 use crate::math::Ray;
+use crate::observed::{Call, Observed, Observer};
 use crate::render::{self, Overrides, Settings, Silent};
 use crate::scene::Scene;
+use crate::{Watch, median_and_range};
+use steradian::Result;
 
 /// Rays whose primitive tests are counted, about.
 const COUNTED: usize = 20_000;

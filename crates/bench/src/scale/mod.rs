@@ -18,7 +18,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::child::{self, Ended};
 use super::{Machine, Watch};
-use crate::error::{Error, Result};
+use steradian::{Error, Result};
 
 /// Measures all sweeps. `program` is started for each case with the case as JSON on its standard input, and answers
 /// with what [`run_case`] gives, as JSON. `after` is given what there is after each sweep of each repeat; a run that is
@@ -75,8 +75,8 @@ fn in_a_process(mut program: Command, case: &Case, stop: &AtomicBool) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Unwatched;
     use crate::accel::AccelKind;
-    use crate::bench::Unwatched;
 
     fn options(sweep: &str) -> ScaleOptions {
         ScaleOptions {

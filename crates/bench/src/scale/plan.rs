@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::quantity::Quantity;
 use crate::accel::AccelKind;
 use crate::desc::{LayerKind, MAX_SIDE};
-use crate::error::{Error, Result};
+use steradian::{Error, Result};
 
 /// Options of the benchmark.
 #[derive(Clone, Debug)]

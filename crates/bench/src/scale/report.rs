@@ -8,13 +8,13 @@ use serde::Serialize;
 use super::plan::{Case, ScaleOptions, Sweep};
 use super::quantity::Quantity;
 use super::run::Measured;
-use crate::bench::report::csv::field;
-use crate::bench::report::html;
-use crate::bench::report::markdown::{self, Table, number, range};
-use crate::bench::report::plot::{self, Curve};
-use crate::bench::report::write_files;
-use crate::bench::{Fit, Machine, fit, median_and_range};
-use crate::error::{Error, Result};
+use crate::report::csv::field;
+use crate::report::html;
+use crate::report::markdown::{self, Table, number, range};
+use crate::report::plot::{self, Curve};
+use crate::report::write_files;
+use crate::{Fit, Machine, fit, median_and_range};
+use steradian::{Error, Result};
 
 /// The columns of the CSV file.
 const COLUMNS: &str = "sweep,at,repeat,width,height,spp,depth,threads,accelerator,triangles,instances,lights,\

@@ -10,10 +10,10 @@ use serde::{Deserialize, Serialize};
 use super::plan::Case;
 use super::scenes;
 use crate::accel;
-use crate::bench::machine::{memory_in_use, reset_peak_memory};
 use crate::compile;
-use crate::error::{Error, Result};
+use crate::machine::{memory_in_use, reset_peak_memory};
 use crate::render::{self, Overrides, Settings, Silent};
+use steradian::{Error, Result};
 
 /// What a case took.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]

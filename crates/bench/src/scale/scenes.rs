@@ -4,11 +4,11 @@ use serde_json::{Value, json};
 
 use super::plan::{Case, Subject};
 use crate::assets::{Assets, MeshData};
-use crate::bench::mesh::bumpy_sphere_data;
 use crate::desc::{InstanceDesc, ScaleDesc, SceneDesc, TransformDesc, TransformStepDesc};
-use crate::error::{Error, Result};
 use crate::import::Imported;
 use crate::math::Rng;
+use crate::mesh::bumpy_sphere_data;
+use steradian::{Error, Result};
 
 /// The name of the mesh that a scene is about.
 const MESH: &str = "generated.ply";

@@ -12,7 +12,7 @@ use crate::camera::{Blades, Camera, Framing, Lens, Projection};
 use crate::film::Image;
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{DAffine3, DVec2, DVec3, Motion, Ray, Transform, Vec2};
-use crate::sampling::statistics::chi_squared_p_value;
+use crate::stability::statistics::chi_squared_p_value;
 
 checks! {
     "K1" k1_thin_lens "rays of a film point meet in focus":

@@ -9,6 +9,7 @@ mod outcome;
 pub mod render;
 mod report;
 pub mod scenes;
+pub mod statistics;
 
 use std::time::Instant;
 
@@ -18,7 +19,7 @@ pub use outcome::{Bound, Measure, Outcome, Plot, Status};
 pub use report::StabilityReport;
 
 use super::Watch;
-use crate::error::{Error, Result};
+use steradian::{Error, Result};
 
 /// How long a check may take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -73,15 +74,15 @@ pub struct CheckReport {
 macro_rules! checks {
     ($($id:literal $run:ident $name:literal: $setup:literal;)*) => {
         /// The checks of this group, in order.
-        pub(super) const CHECKS: &[$crate::bench::stability::Check] =
-            &[$($crate::bench::stability::Check { id: $id, name: $name, setup: $setup, run: $run }),*];
+        pub(super) const CHECKS: &[$crate::stability::Check] =
+            &[$($crate::stability::Check { id: $id, name: $name, setup: $setup, run: $run }),*];
 
         #[cfg(test)]
         mod quick {
             $(
                 #[test]
                 fn $run() {
-                    $crate::bench::stability::testing::assert_passes($id);
+                    $crate::stability::testing::assert_passes($id);
                 }
             )*
         }
@@ -214,7 +215,7 @@ pub(crate) mod testing {
         if report.status != Status::Failed {
             return;
         }
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/stability");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/stability");
         let written = report::write_evidence(&folder, &report).map_or_else(|e| e.to_string(), |files| files.join(", "));
         panic!("{id} {}: {}; evidence: {written}", check.name, report::broken(&report));
     }

@@ -7,14 +7,14 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::{Bound, CheckReport, Effort, Measure, Outcome, Plot, Status, catalogue, group};
-use crate::bench::Machine;
-use crate::bench::report::html;
-use crate::bench::report::markdown::{self, Table};
-use crate::bench::report::plot::{self, Curve};
-use crate::bench::report::write_files;
+use crate::Machine;
 use crate::desc::{OutputDesc, PixelTypeDesc};
-use crate::error::{Error, Result};
 use crate::output::{RenderInfo, write_exr};
+use crate::report::html;
+use crate::report::markdown::{self, Table};
+use crate::report::plot::{self, Curve};
+use crate::report::write_files;
+use steradian::{Error, Result};
 
 /// Name of the file that a run can be taken up from.
 const JSON: &str = "stability.json";

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::{Effort, Outcome, Plot, sidak_level};
-use crate::sampling::statistics::chi_squared_p_value;
 use crate::sampling::{PixelSeed, Sampler, SamplerKind};
+use crate::stability::statistics::chi_squared_p_value;
 
 checks! {
     "S1" s1_elementary_intervals "every elementary interval holds one sample":

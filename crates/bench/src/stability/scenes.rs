@@ -6,7 +6,7 @@ use super::geometry::{
 };
 use crate::accel::inspect::Inspect;
 use crate::accel::{self, AccelKind, Accelerator, Coherence, EmbreeInfo};
-use crate::bench::bumpy_sphere;
+use crate::bumpy_sphere;
 use crate::geometry::{
     CurveBasis, CurveKind, Curves, Geometry, Hit, Instance, Mesh, MeshStep, Object, Points, Shape, Strands,
 };

@@ -4,7 +4,7 @@ use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 use super::render::Estimate;
 use super::{Outcome, sidak_level};
-use crate::sampling::statistics::chi_squared_p_value;
+use crate::stability::statistics::chi_squared_p_value;
 
 /// Mean of some numbers with its standard error.
 pub(super) fn estimate(values: &[f64]) -> Estimate {

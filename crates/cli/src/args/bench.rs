@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use steradian::accel::AccelKind;
+use steradian::internal::accel::AccelKind;
 
 use super::import::ImportArgs;
 use super::{accel_help, bench_error, bench_scale, parse_size};

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use steradian::accel::AccelKind;
 use steradian::desc::{IntegratorDesc, SamplerKindDesc, StrategyDesc};
+use steradian::internal::accel::AccelKind;
 
 use super::import::ImportArgs;
 use super::{accel_help, parse_size, parse_switch};

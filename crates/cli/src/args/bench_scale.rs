@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use steradian::accel::AccelKind;
-use steradian::bench::scale::SWEEPS;
+use steradian::internal::accel::AccelKind;
+use steradian_bench::scale::SWEEPS;
 
 use super::{accel_help, parse_size};
 

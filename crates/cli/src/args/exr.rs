@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use steradian::desc::{CompressionDesc, CryptoManifestDesc, ExrProfileDesc};
-use steradian::render::ExrOverrides;
+use steradian::internal::render::ExrOverrides;
 
 use super::denoise::OidnArgs;
 use crate::names;

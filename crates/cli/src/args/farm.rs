@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use steradian::farm::FrameList;
+use steradian::internal::farm::FrameList;
 
 const SLURM_ABOUT: &str = "\
 Write a job for Slurm: an array of shards for every frame, and a job that merges them

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use steradian::farm::{FORMATS, FrameList, ProgressFormat};
+use steradian::internal::farm::{FORMATS, FrameList, ProgressFormat};
 
 /// The format of progress, and which frames are rendered.
 #[derive(Clone, Debug, Default, Args)]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{ArgAction, Args};
-use steradian::import::ImportOptions;
+use steradian::internal::import::ImportOptions;
 
 /// How scenes of other renderers are read.
 #[derive(Clone, Debug, Default, Args)]

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use clap::Args;
 use steradian::Result;
-use steradian::live::{DEFAULT_ADDRESS, Live, Options, PreviewOptions, TevOptions};
-use steradian::render::Settings;
+use steradian::internal::live::{DEFAULT_ADDRESS, Live, Options, PreviewOptions, TevOptions};
+use steradian::internal::render::Settings;
 
 /// The live viewers of a render.
 #[derive(Clone, Debug, Default, Args)]

@@ -22,9 +22,9 @@ use std::path::PathBuf;
 use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use steradian::Assignment;
-use steradian::accel::AccelKind;
 use steradian::desc::{CausticsDesc, IntegratorDesc, RouletteDesc, SamplerKindDesc, StrategyDesc, ViewDesc};
-use steradian::render::Overrides;
+use steradian::internal::accel::AccelKind;
+use steradian::internal::render::Overrides;
 
 use crate::names::{self, Layers};
 use crate::rerender::Repeat;

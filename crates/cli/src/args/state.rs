@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use steradian::render::Shard;
+use steradian::internal::render::Shard;
 
 pub const MERGE_EXAMPLES: &str = "\
 Examples:

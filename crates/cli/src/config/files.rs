@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use steradian::config::{self, Entry, Trust};
+use steradian::internal::config::{self, Entry, Trust};
 use steradian::{Error, Result};
 
 use super::{Options, Origin, Setting};
@@ -132,7 +132,7 @@ mod tests {
                 assert!(matches!(&error, Error::Usage(found) if found.starts_with("s.toml:")), "{text}: {error}");
             }
         };
-        let mut rng = steradian::math::Rng::new(5);
+        let mut rng = steradian::internal::math::Rng::new(5);
         for _ in 0..100 {
             let mut bytes = TEXT.as_bytes().to_vec();
             for _ in 0..=rng.below(4) {
@@ -145,7 +145,7 @@ mod tests {
             }
             check(&String::from_utf8_lossy(&bytes));
         }
-        let archive = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus.tar.gz");
+        let archive = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus.tar.gz");
         let archive = flate2::read::GzDecoder::new(std::fs::File::open(archive).unwrap());
         let mut count = 0;
         for entry in tar::Archive::new(archive).entries().unwrap() {

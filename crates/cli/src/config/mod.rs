@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
-use steradian::config::{PREFIX, Trust, Words, trust};
-use steradian::farm::message_lines;
-use steradian::suggestion::did_you_mean;
+use steradian::internal::config::{PREFIX, Trust, Words, trust};
+use steradian::internal::farm::message_lines;
+use steradian::internal::suggestion::did_you_mean;
 use steradian::{Error, Result};
 
 use crate::args::{Cli, FIRST_STEPS, command_line};
@@ -268,7 +268,7 @@ pub fn settings(options: &Options, scene: &Path) -> Result<Found> {
     let mut found = environment(options, std::env::vars_os(), &mut warnings)?;
     let mut files = Vec::new();
     let user = rustix::process::geteuid().as_raw();
-    for (file, trust) in steradian::config::for_scene(scene) {
+    for (file, trust) in steradian::internal::config::for_scene(scene) {
         match files::read(options, &file, trust, user)? {
             Ok(settings) => {
                 found.extend(settings);
@@ -373,7 +373,8 @@ mod tests {
         command.build();
         let render = command.find_subcommand("render").unwrap();
         let mut options: Vec<&str> = render.get_arguments().filter_map(Arg::get_long).collect();
-        let mut classified: Vec<&str> = steradian::config::options().filter(|name| *name != "version").collect();
+        let mut classified: Vec<&str> =
+            steradian::internal::config::options().filter(|name| *name != "version").collect();
         options.sort_unstable();
         classified.sort_unstable();
         assert_eq!(options, classified);

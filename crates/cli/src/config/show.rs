@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::CommandFactory;
 use serde_json::{Map, Value, json};
-use steradian::import::{self, ImportOptions};
+use steradian::internal::import::{self, ImportOptions};
 use steradian::{Error, Result};
 
 use super::{Options, settings};

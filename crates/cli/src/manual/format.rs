@@ -256,7 +256,7 @@ mod tests {
 
     #[test]
     fn every_type_of_the_lists_has_an_example() {
-        let schema: Value = serde_json::from_str(&steradian::import::schema()).unwrap();
+        let schema: Value = serde_json::from_str(&steradian::internal::import::schema()).unwrap();
         for name in ["ShapeDesc", "MaterialDesc", "LightDesc", "TextureDesc"] {
             for tag in schema["$defs"][name]["oneOf"].as_array().unwrap().iter().filter_map(tag) {
                 assert_ne!(example(name, tag), "", "{name} {tag}");

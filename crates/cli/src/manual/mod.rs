@@ -8,7 +8,8 @@ use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
-use steradian::{Error, Result, output};
+use steradian::internal::output;
+use steradian::{Error, Result};
 
 pub use commands::pages as command_pages;
 pub use format::pages as format_pages;

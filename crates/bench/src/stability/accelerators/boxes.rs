@@ -4,11 +4,11 @@ use std::f64::consts::TAU;
 
 use super::{count, differing, oracle_hits};
 use crate::accel::LinearAccel;
-use crate::bench::stability::geometry::{Rng, cube, meshes, ray, ray_through, soup, transform, world};
-use crate::bench::stability::scenes::{all, own};
-use crate::bench::stability::{Effort, Outcome, Plot};
 use crate::geometry::{Analytic, Disk, Geometry, Mesh, Shape, Sphere, TransformedShape};
 use crate::math::{DMat3, DVec3, Ray, Transform, Vec3};
+use crate::stability::geometry::{Rng, cube, meshes, ray, ray_through, soup, transform, world};
+use crate::stability::scenes::{all, own};
+use crate::stability::{Effort, Outcome, Plot};
 
 fn corner(mesh: &Mesh, i: usize) -> DVec3 {
     DVec3::from_array(mesh.positions()[i].map(f64::from))

@@ -1,11 +1,11 @@
 //! Bounds over the whole shutter interval.
 
-use crate::bench::stability::geometry::Rng;
-use crate::bench::stability::scenes::{deforming, motion};
-use crate::bench::stability::{Effort, Outcome};
 use crate::geometry::{Instance, Shape};
 use crate::id::{ObjectId, PrimId};
 use crate::math::{Aabb, Bounds, DVec3};
+use crate::stability::geometry::Rng;
+use crate::stability::scenes::{deforming, motion};
+use crate::stability::{Effort, Outcome};
 
 fn holds(bounds: &Aabb, p: DVec3) -> bool {
     bounds.min.as_dvec3().cmple(p).all() && p.cmple(bounds.max.as_dvec3()).all()

@@ -1,11 +1,11 @@
 //! How much work a ray costs.
 
 use crate::accel::inspect::TraversalCounts;
-use crate::bench::bumpy_sphere;
-use crate::bench::stability::geometry::{Rng, meshes};
-use crate::bench::stability::scenes::{build, path_rays};
-use crate::bench::stability::{Effort, Outcome};
+use crate::bumpy_sphere;
 use crate::math::Ray;
+use crate::stability::geometry::{Rng, meshes};
+use crate::stability::scenes::{build, path_rays};
+use crate::stability::{Effort, Outcome};
 
 /// Nodes and primitives of camera and of bounce rays as recorded, to notice a change; with the most that is acceptable
 /// for camera rays.

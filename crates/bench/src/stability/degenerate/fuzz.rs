@@ -4,19 +4,19 @@ use std::path::Path;
 use std::time::Instant;
 
 use super::{Effort, Outcome};
-use crate::bench::stability::geometry::Rng;
 use crate::compile;
 use crate::render::{Overrides, Settings};
+use crate::stability::geometry::Rng;
 use crate::{assets, import};
 
 /// What is mutated: scenes of the gallery, which between them use most of what there is.
 const SCENES: [&str; 6] = [
-    include_str!("../../../../scenes/cornell.json"),
-    include_str!("../../../../scenes/glass.json"),
-    include_str!("../../../../scenes/motion.json"),
-    include_str!("../../../../scenes/analytic.json"),
-    include_str!("../../../../scenes/shapes.json"),
-    include_str!("../../../../scenes/depth_of_field.json"),
+    include_str!("../../../scenes/cornell.json"),
+    include_str!("../../../scenes/glass.json"),
+    include_str!("../../../scenes/motion.json"),
+    include_str!("../../../scenes/analytic.json"),
+    include_str!("../../../scenes/shapes.json"),
+    include_str!("../../../scenes/depth_of_field.json"),
 ];
 
 const OBJ: &str = "mtllib a.mtl\no cube\nv 0 0 0 1 0 0\nv 1 0 0 0.5 0.5 0.5\nv 1 1 0 0 1 0\nv 0 1 0 0 0 1\nvn 0 0 1\n\

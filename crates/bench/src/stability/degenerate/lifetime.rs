@@ -4,13 +4,13 @@ use rayon::prelude::*;
 
 use super::{Effort, Outcome};
 use crate::accel::{AccelKind, Accelerator, EmbreeAccel, EmbreeOptions, EmbreeQuality, LinearAccel};
-use crate::bench::bumpy_sphere;
-use crate::bench::stability::geometry::{
-    Rng, all_analytic_shapes, cube, instances, meshes, ray, soup, transform, triangle, world,
-};
-use crate::bench::stability::scenes::{all, all_answers, build, moving_scene, same, scenes, test_rays};
+use crate::bumpy_sphere;
 use crate::geometry::{Geometry, Shape, TransformedShape};
 use crate::math::{DMat3, DVec3, Ray, Transform};
+use crate::stability::geometry::{
+    Rng, all_analytic_shapes, cube, instances, meshes, ray, soup, transform, triangle, world,
+};
+use crate::stability::scenes::{all, all_answers, build, moving_scene, same, scenes, test_rays};
 
 /// How many answers of any accelerator are not the oracle's.
 fn differing(geometry: &Geometry, rays: &[Ray]) -> usize {

@@ -3,11 +3,11 @@
 use super::{Effort, Outcome};
 use crate::accel::inspect::{StructureStats, TraversalCounts};
 use crate::accel::{AccelKind, Accelerator, LinearAccel};
-use crate::bench::stability::geometry::{Rng, mesh, meshes, ray, ray_through, soup, triangle};
-use crate::bench::stability::scenes::{INEXACT_RECIPROCALS, all, all_answers, build, distance_error, own};
 use crate::geometry::{Mesh, MeshError};
 use crate::math::float::EMBREE_LARGE;
 use crate::math::{Aabb, DVec3, Ray};
+use crate::stability::geometry::{Rng, mesh, meshes, ray, ray_through, soup, triangle};
+use crate::stability::scenes::{INEXACT_RECIPROCALS, all, all_answers, build, distance_error, own};
 
 /// A few triangles of random bits, with exponents up to `largest`; every eighth one has an index out of range.
 fn garbage(rng: &mut Rng, largest: u32) -> Result<Mesh, MeshError> {

@@ -2,13 +2,11 @@
 
 use super::{Effort, Outcome};
 use crate::accel::{AccelKind, Accelerator};
-use crate::bench::stability::geometry::{
-    Rng, cube, instances, meshes, placed_analytic_shapes, transform, triangle, world,
-};
-use crate::bench::stability::scenes::{INEXACT_RECIPROCALS, all, all_answers, build, distance_error};
 use crate::geometry::{Geometry, Hit, Shape};
 use crate::math::float::{SMALLEST_NORMAL, step_past};
 use crate::math::{DMat3, DVec3, Ray, Vec3};
+use crate::stability::geometry::{Rng, cube, instances, meshes, placed_analytic_shapes, transform, triangle, world};
+use crate::stability::scenes::{INEXACT_RECIPROCALS, all, all_answers, build, distance_error};
 
 /// A valid ray that hits every scene of [`scenes`].
 const GOOD: Ray =

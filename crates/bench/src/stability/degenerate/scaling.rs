@@ -5,11 +5,11 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::{Effort, Outcome};
 use crate::accel::AccelKind;
-use crate::bench::stability::render::{block_means, pixels, prepare, render_with};
-use crate::bench::stability::{Plot, sidak_level};
 use crate::film::Image;
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::render::Overrides;
+use crate::stability::render::{block_means, pixels, prepare, render_with};
+use crate::stability::{Plot, sidak_level};
 
 const WIDTH: u32 = 48;
 const HEIGHT: u32 = 48;

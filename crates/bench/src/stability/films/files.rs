@@ -3,11 +3,11 @@
 use half::f16;
 
 use super::{Effort, Outcome, bytes, mean_by_film};
-use crate::bench::stability::geometry::Rng;
 use crate::color::linear_from_srgb;
 use crate::desc::{CompressionDesc, LayerKind, OutputDesc, PixelTypeDesc, ViewDesc};
 use crate::film::{Crop, Image, Layer, LayerInfo};
 use crate::output::{RenderInfo, read_exr, write_exr, write_png};
+use crate::stability::geometry::Rng;
 
 const COMPRESSIONS: [CompressionDesc; 5] =
     [CompressionDesc::Zip, CompressionDesc::Zips, CompressionDesc::Piz, CompressionDesc::Rle, CompressionDesc::None];

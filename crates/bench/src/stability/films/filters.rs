@@ -5,11 +5,11 @@ use std::f64::consts::TAU;
 use statrs::function::erf::erf;
 
 use super::{Effort, Outcome, sidak_level};
-use crate::bench::stability::geometry::Rng;
 use crate::desc::FilterDesc;
 use crate::film::Filter;
 use crate::math::Vec2;
-use crate::sampling::statistics::chi_squared_p_value;
+use crate::stability::geometry::Rng;
+use crate::stability::statistics::chi_squared_p_value;
 
 /// The integral of a filter along one axis.
 fn closed_form(desc: &FilterDesc, r: f64) -> f64 {

@@ -3,7 +3,6 @@
 use std::f64::consts::TAU;
 
 use super::{Effort, Outcome, TWO_SIDED, Tests, first_light, place, skew, target};
-use crate::bench::stability::geometry::{meshes, triangle};
 use crate::geometry::{
     Analytic, Disk, Frustum, Geometry, Profile, Quad, Revolution, Shape, Sphere, SurfaceInteraction,
 };
@@ -11,6 +10,7 @@ use crate::id::{PrimId, ShapeId};
 use crate::light::AreaLight;
 use crate::math::float::step_past;
 use crate::math::{DVec3, Ray, Rng};
+use crate::stability::geometry::{meshes, triangle};
 
 /// Parts of equal area along each side.
 const PARTS: usize = 12;

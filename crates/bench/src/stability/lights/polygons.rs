@@ -1,10 +1,10 @@
 //! Rectangles, by the solid angle they fill, and triangles.
 
 use super::{Effort, Outcome, TWO_SIDED, Tests, first_light, grid, place, target, transform};
-use crate::bench::stability::geometry::{meshes, triangle};
 use crate::geometry::{Analytic, Quad};
 use crate::light::AreaLight;
 use crate::math::{DMat3, DVec3, Rng};
+use crate::stability::geometry::{meshes, triangle};
 use crate::{geometry::Geometry, id::ShapeId};
 
 /// Cells of a rectangle along each side.
@@ -33,7 +33,7 @@ fn quad_solid_angle(p: DVec3, corner: DVec3, u: DVec3, v: DVec3) -> f64 {
 
 /// Irradiance at the origin from a polygon of radiance 1 above the horizon: E = 1/2 sum acos(a·b) n·(a x b) / |a x b|
 /// (Lambert).
-pub(in crate::bench::stability) fn lambert(corners: &[DVec3], n: DVec3) -> f64 {
+pub(in crate::stability) fn lambert(corners: &[DVec3], n: DVec3) -> f64 {
     let around = corners.iter().zip(corners.iter().cycle().skip(1));
     let sum: f64 = around.map(|(a, b)| a.angle_between(*b) * n.dot(a.cross(*b).normalize())).sum();
     (0.5 * sum).abs()

@@ -4,13 +4,13 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
 
 use super::{Effort, Outcome, TWO_SIDED, WHITE, first_light, place, quasi_random, transform};
-use crate::bench::stability::geometry::{all_analytic_shapes, meshes, triangle};
 use crate::color::Rgb;
 use crate::geometry::{Analytic, Geometry, Profile, Revolution};
 use crate::light::{
     DirectionalLight, Environment, EnvironmentMap, IesLight, IesProfile, Light, MisCompensation, PointLight, SpotLight,
 };
 use crate::math::{DMat3, DVec3};
+use crate::stability::geometry::{all_analytic_shapes, meshes, triangle};
 
 /// Where lamps stand, and around which their light is gathered.
 const CENTER: DVec3 = DVec3::new(0.4, 1.0, -0.7);

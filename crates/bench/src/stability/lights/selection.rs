@@ -3,7 +3,6 @@
 use std::f64::consts::TAU;
 
 use super::{Effort, Outcome, Tests, transform};
-use crate::bench::stability::geometry::mesh;
 use crate::color::Rgb;
 use crate::geometry::{Analytic, Disk, Geometry, Quad, Shape, Sphere, TransformedShape};
 use crate::id::{LightId, ShapeId};
@@ -12,6 +11,7 @@ use crate::light::{
     MisCompensation, PointLight, SpotLight,
 };
 use crate::math::{DMat3, DVec3, Rng, Vec3};
+use crate::stability::geometry::mesh;
 
 /// Lights of every kind that is not at infinity, of sizes and powers that differ by orders of magnitude, and optionally
 /// a sky.

@@ -3,11 +3,11 @@
 use std::f64::consts::{PI, TAU};
 
 use super::{Effort, Outcome, TWO_SIDED, Tests, first_light, grid, place, target, transform};
-use crate::bench::stability::Plot;
 use crate::geometry::{Analytic, Geometry, Sphere};
 use crate::id::{PrimId, ShapeId};
 use crate::light::AreaLight;
 use crate::math::{DMat3, DVec3, Ray, Rng};
+use crate::stability::Plot;
 
 const RADIUS: f64 = 2.5;
 const CENTER: DVec3 = DVec3::new(0.1, 0.2, 0.3);

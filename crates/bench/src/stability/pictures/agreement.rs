@@ -1,7 +1,7 @@
 //! Whether two sets of renders may be of the same scene.
 
 use super::{Effort, Outcome, PIXELS, Prepared, SIDE, Tests, json, pictures, prepared, room};
-use crate::bench::stability::verdict::{estimate, welch};
+use crate::stability::verdict::{estimate, welch};
 
 /// Independent renders of a scene, each a row of pixels.
 type Renders = Vec<Vec<f64>>;

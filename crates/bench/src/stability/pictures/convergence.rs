@@ -1,8 +1,8 @@
 //! How the error falls with samples.
 
 use super::{Effort, Outcome, json, pictures, prepared, room};
-use crate::bench::fitted_slope;
-use crate::bench::stability::Plot;
+use crate::fitted_slope;
+use crate::stability::Plot;
 
 /// Relative squared error of a picture: over all pixels, and without the largest thousandth.
 fn relative_errors(picture: &[f64], reference: &[f64]) -> [f64; 2] {

@@ -5,17 +5,17 @@ use std::path::Path;
 
 use super::{Effort, Outcome, luminance};
 use crate::accel::AccelKind;
-use crate::bench::stability::render::{Prepared, render_with};
-use crate::error::{ErrorKind, Result};
 use crate::film::Image;
 use crate::render::{Overrides, Settings};
+use crate::stability::render::{Prepared, render_with};
 use crate::{compile, import};
+use steradian::{ErrorKind, Result};
 
 /// Scenes without files beside them.
 const BUILT_IN: [(&str, &str); 3] = [
-    ("cornell", include_str!("../../../../scenes/cornell.json")),
-    ("glass", include_str!("../../../../scenes/glass.json")),
-    ("phi_max", include_str!("../../../../scenes/phi_max.json")),
+    ("cornell", include_str!("../../../scenes/cornell.json")),
+    ("glass", include_str!("../../../scenes/glass.json")),
+    ("phi_max", include_str!("../../../scenes/phi_max.json")),
 ];
 
 /// How many times the median of its surroundings a firefly is.

@@ -2,8 +2,8 @@
 
 use super::{Effort, Outcome, Value, json, luminance, merge, scene};
 use crate::accel::{AccelKind, EmbreeAccel, Registered};
-use crate::bench::stability::render::{prepare, render_with};
 use crate::render::Overrides;
+use crate::stability::render::{prepare, render_with};
 
 /// A triangle, at rest and without holes, in the world and in an instance.
 fn plain() -> Value {

@@ -1,13 +1,13 @@
 //! Hits of quadrics and flat shapes against the oracle of 106 bits.
 
 use crate::accel::{self, AccelKind, LinearAccel};
-use crate::bench::stability::geometry::{Rng, closest, transform as moved, world};
-use crate::bench::stability::oracle::{Answer, Case, ExactTransform, partial_cases, whole_cases};
-use crate::bench::stability::vectors::{SHAPES, ShapeVector, excluded as excluded_of, shape_vectors};
-use crate::bench::stability::{Effort, Outcome, Plot};
 use crate::geometry::{Analytic, Geometry, Shape, Sphere, TransformedShape};
 use crate::math::float::{F64_CHAIN_ERROR, UNIT_ROUNDOFF};
 use crate::math::{Bounds, DMat3, DVec3, Ray, Transform, Vec3};
+use crate::stability::geometry::{Rng, closest, transform as moved, world};
+use crate::stability::oracle::{Answer, Case, ExactTransform, partial_cases, whole_cases};
+use crate::stability::vectors::{SHAPES, ShapeVector, excluded as excluded_of, shape_vectors};
+use crate::stability::{Effort, Outcome, Plot};
 
 /// Distances of origins, in sizes of the shape.
 const DISTANCES: [f64; 7] = [3.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6];

@@ -2,10 +2,10 @@
 
 use twofloat::TwoFloat;
 
-use crate::bench::stability::geometry::Rng;
-use crate::bench::stability::oracle::{quotient, root, value};
-use crate::bench::stability::{Effort, Outcome};
 use crate::math::{Quadratic, difference_of_products, solve_quadratic};
+use crate::stability::geometry::Rng;
+use crate::stability::oracle::{quotient, root, value};
+use crate::stability::{Effort, Outcome};
 
 /// Distance between neighbouring numbers at `x`.
 fn ulp(x: f64) -> f64 {

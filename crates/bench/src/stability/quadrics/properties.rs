@@ -4,14 +4,14 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use crate::accel::{self, AccelKind, Accelerator, Coherence, LinearAccel};
-use crate::bench::stability::geometry::{Rng, closest, ray_through, transform, world};
-use crate::bench::stability::oracle::{Answer, Case, ExactTransform, partial_cases, whole_cases};
-use crate::bench::stability::{Effort, Outcome};
 use crate::geometry::{
     Analytic, Disk, Frustum, Geometry, LocalSurface, Profile, Revolution, Shape, Sphere, TransformedShape,
 };
 use crate::math::float::{F64_CHAIN_ERROR, UNIT_ROUNDOFF};
 use crate::math::{Bounds, DMat3, DVec3, Frame, Ray, RayF64, Transform, dvec3};
+use crate::stability::geometry::{Rng, closest, ray_through, transform, world};
+use crate::stability::oracle::{Answer, Case, ExactTransform, partial_cases, whole_cases};
+use crate::stability::{Effort, Outcome};
 
 const VALID: &str = "the checks' shapes are valid";
 const VASE: [[f64; 2]; 7] = [[0.0, -1.0], [0.9, -1.0], [1.2, -0.3], [0.5, 0.2], [0.2, 0.4], [0.3, 0.9], [0.6, 1.0]];

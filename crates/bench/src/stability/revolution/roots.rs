@@ -3,8 +3,8 @@
 
 use twofloat::TwoFloat;
 
-use crate::bench::stability::oracle::{quotient, root, value};
 use crate::math::RayF64;
+use crate::stability::oracle::{quotient, root, value};
 
 /// A polynomial by powers, the constant first.
 type Polynomial = Vec<TwoFloat>;

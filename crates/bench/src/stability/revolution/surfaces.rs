@@ -2,11 +2,11 @@
 
 use super::*;
 use crate::accel::{Accelerator, LinearAccel};
-use crate::bench::stability::geometry::{closest, transform, world};
-use crate::bench::stability::oracle::line_cases;
-use crate::bench::stability::quadrics::compare_with_oracle;
 use crate::geometry::{Analytic, Frustum, Shape, TransformedShape};
 use crate::math::{DMat3, DVec2};
+use crate::stability::geometry::{closest, transform, world};
+use crate::stability::oracle::line_cases;
+use crate::stability::quadrics::compare_with_oracle;
 
 /// A line as a cubic with its parameter proportional to length.
 pub fn line(a: [f64; 2], b: [f64; 2]) -> Vec<[f64; 2]> {
@@ -114,7 +114,7 @@ pub(super) fn d5_spheroids_are_not_hit_again(effort: Effort) -> Outcome {
                 let geometry = world(vec![Shape::Analytic(TransformedShape::new(shape, transform(linear, center)))]);
                 let accel = LinearAccel::new(&geometry);
                 let from = center + rng.direction() * radius * rng.range(3.0, 30.0);
-                let ray = crate::bench::stability::geometry::ray_through(from, center + rng.direction() * 0.5 * radius);
+                let ray = crate::stability::geometry::ray_through(from, center + rng.direction() * 0.5 * radius);
                 let Some(at) = closest(&accel, &geometry, &ray).found else { continue };
                 let n = at.n_g.as_dvec3();
                 for i in 0..20 {

@@ -7,7 +7,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::super::{Effort, Outcome, sidak_level};
 use super::materials::{View, rough, views};
-use crate::sampling::statistics::{DirectionTest, compare_directions_on};
+use crate::stability::statistics::{DirectionTest, compare_directions_on};
 
 /// Rows and columns of cells (pbrt, bsdfs_test.cpp).
 const GRID: [usize; 2] = [80, 160];

@@ -12,7 +12,7 @@ use crate::bsdf::{Bsdf, BsdfEval, Plastic};
 use crate::color::Rgb;
 use crate::math::Vec3;
 use crate::math::float::ONE_MINUS_EPSILON;
-use crate::sampling::statistics::random_points;
+use crate::stability::statistics::random_points;
 
 /// Incident radiance that differs by direction.
 fn sky(w: Vec3) -> f64 {

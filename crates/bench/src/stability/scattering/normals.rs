@@ -7,7 +7,7 @@ use super::super::{Effort, Outcome, sidak_level};
 use super::materials::{ALPHAS, direction};
 use crate::bsdf::{Ggx, Microfacets};
 use crate::math::{Vec3, sin_cos_turns, vec3};
-use crate::sampling::statistics::{compare_directions, random_points};
+use crate::stability::statistics::{compare_directions, random_points};
 
 /// Heitz, "Sampling the GGX Distribution of Visible Normals": the same density by another construction.
 fn sample_by_disk(ggx: &Ggx, o: Vec3, u: [f32; 2]) -> Vec3 {

@@ -2,10 +2,10 @@
 
 use super::{Effort, Leavings, NAMES, Outcome, accelerators};
 use crate::accel::{self, AccelKind};
-use crate::bench::stability::geometry::{Rng, closest, cube, instances, meshes, ray, ray_through, transform, world};
 use crate::geometry::{Analytic, Geometry, Instance, Mesh, MeshStep, Object, Shape, Sphere, TransformedShape};
 use crate::id::{ObjectId, ShapeId};
 use crate::math::{DAffine3, DMat3, DVec3, Motion, Ray, Transform};
+use crate::stability::geometry::{Rng, closest, cube, instances, meshes, ray, ray_through, transform, world};
 
 pub(super) fn b4_closed_boxes(effort: Effort) -> Outcome {
     let mut rng = Rng::new(4);

@@ -11,11 +11,11 @@ mod triangles;
 use super::geometry::{Closest, Rng, closest, ray_through};
 use super::{Effort, Outcome};
 use crate::accel::{self, Accelerator};
-use crate::bench::stability::scenes::packets;
 use crate::geometry::{Geometry, Mesh, SpawnPoint, SurfaceInteraction};
 use crate::id::PrimId;
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{DVec3, Ray, Vec3};
+use crate::stability::scenes::packets;
 
 use boxes::{b3_two_sides, b4_closed_boxes, b7_instances};
 use moving::b14_moving;

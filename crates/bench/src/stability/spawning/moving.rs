@@ -3,8 +3,8 @@
 use super::boxes::moving_chains;
 use super::{Effort, Leavings, Outcome, leaving};
 use crate::accel::{self, AccelKind};
-use crate::bench::stability::geometry::{Rng, closest, ray_through};
 use crate::math::Ray;
+use crate::stability::geometry::{Rng, closest, ray_through};
 
 pub(super) fn b14_moving(effort: Effort) -> Outcome {
     let mut rng = Rng::new(14);

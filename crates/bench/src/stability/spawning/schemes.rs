@@ -3,10 +3,10 @@
 
 use super::{Effort, Outcome, accelerators};
 use crate::accel::Accelerator;
-use crate::bench::stability::Plot;
-use crate::bench::stability::geometry::{Rng, closest, cube, meshes, ray};
 use crate::geometry::{Geometry, SurfaceInteraction};
 use crate::math::{DMat3, DVec3, Ray, Vec3};
+use crate::stability::Plot;
+use crate::stability::geometry::{Rng, closest, cube, meshes, ray};
 
 /// A way to start a ray.
 #[derive(Clone, Copy, PartialEq)]

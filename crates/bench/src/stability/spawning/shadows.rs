@@ -3,7 +3,6 @@
 use std::f64::consts::TAU;
 
 use super::{Effort, NAMES, Named, Outcome, accelerators, aimed, point_on, seen};
-use crate::bench::stability::geometry::{Rng, grid, mesh, triangle, world};
 use crate::color::Rgb;
 use crate::geometry::{
     Analytic, Disk, Frustum, Geometry, Mesh, Profile, Quad, Revolution, Shape, Sphere, TransformedShape,
@@ -11,6 +10,7 @@ use crate::geometry::{
 use crate::id::{PrimId, ShapeId};
 use crate::light::{AreaLight, Emission};
 use crate::math::{DAffine3, DVec3, Transform};
+use crate::stability::geometry::{Rng, grid, mesh, triangle, world};
 
 const VALID: &str = "the emitters' parameters are valid";
 

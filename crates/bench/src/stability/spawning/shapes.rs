@@ -4,10 +4,10 @@ use std::f64::consts::TAU;
 
 use super::{Effort, Leavings, NAMES, Outcome, accelerators, leaving};
 use crate::accel::{self, AccelKind, Accelerator};
-use crate::bench::stability::geometry::{Rng, closest, grid, ray, ray_through, transform, world};
 use crate::geometry::{Analytic, Disk, Frustum, Geometry, Profile, Quad, Revolution, Shape, Sphere, TransformedShape};
 use crate::math::float::step_past;
 use crate::math::{DVec3, Ray, Transform};
+use crate::stability::geometry::{Rng, closest, grid, ray, ray_through, transform, world};
 
 const VALID: &str = "the shapes' parameters are valid";
 

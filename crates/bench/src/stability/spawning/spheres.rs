@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::{Effort, Outcome};
-use crate::bench::stability::render::{pixels, render};
+use crate::stability::render::{pixels, render};
 
 /// The smallest and the largest, as far as OSPRay's test goes, and one that has all digits of the smallest.
 const RADII: [f64; 3] = [1e-3, 3e5, 1e-3 * (1 << 28) as f64];

@@ -2,10 +2,10 @@
 
 use super::{Effort, Leavings, NAMES, Outcome, accelerators, aimed, either, leaving, point_on, seen};
 use crate::accel::{Accelerator, LinearAccel};
-use crate::bench::stability::geometry::{Rng, closest, grid, meshes, triangle};
 use crate::geometry::{Mesh, Shape};
 use crate::id::PrimId;
 use crate::math::{DVec3, Vec3};
+use crate::stability::geometry::{Rng, closest, grid, meshes, triangle};
 
 /// Leaves the one triangle of `mesh` `directions` times, through every accelerator.
 fn leave_triangle(rng: &mut Rng, mesh: Mesh, directions: usize, tally: &mut [Leavings; NAMES.len()]) {

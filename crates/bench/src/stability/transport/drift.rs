@@ -3,7 +3,6 @@
 use super::furnaces::glowing_sphere;
 use super::{Effort, Outcome, Tests, prepare};
 use crate::accel::{self, AccelKind};
-use crate::bench::stability::Plot;
 use crate::film::{Crop, Film, FilmShape, LayerSet, LightAovRequest};
 use crate::integrator::{
     self, CameraBatch, CameraSample, PassContext, RenderContext, Setup, SurfaceAovs, Workspace, World, dimensions,
@@ -11,6 +10,7 @@ use crate::integrator::{
 use crate::math::Vec2;
 use crate::render::{Overrides, Settings};
 use crate::sampling::Sampler;
+use crate::stability::Plot;
 
 /// Width and height: a picture's tiles would trace a thousand pixels.
 const WIDTH: u32 = 4;

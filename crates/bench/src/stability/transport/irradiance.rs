@@ -3,9 +3,9 @@
 use std::f64::consts::PI;
 
 use super::{Effort, Outcome, PIXELS, SIDE, STRATEGIES, Tests, Value, json, mean, merge, with_strategy};
-use crate::bench::stability::lights::lambert;
-use crate::bench::stability::render::{Estimate, floor_probe, probe};
 use crate::math::DVec3;
+use crate::stability::lights::lambert;
+use crate::stability::render::{Estimate, floor_probe, probe};
 
 /// Irradiance that a probe sees on the floor, from shapes of radiance 1 by each strategy, against what is expected.
 fn compare(tests: &mut Tests, effort: Effort, name: &str, mut scene: Value, expected: f64) -> f64 {

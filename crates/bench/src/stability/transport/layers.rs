@@ -2,9 +2,9 @@
 
 use super::{Effort, Outcome, PIXELS, SIDE, Tests, Value, json, merge, pixels, prepare, render, render_with, scene};
 use crate::accel::{AccelKind, EmbreeOptions, EmbreeQuality};
-use crate::bench::stability::render::Estimate;
-use crate::bench::stability::verdict::estimate;
 use crate::render::Overrides;
+use crate::stability::render::Estimate;
+use crate::stability::verdict::estimate;
 
 /// Meshes of two triangles each, with opacity one half, before a sky of radiance 1: the diagonal runs from corner to
 /// corner of the picture.
