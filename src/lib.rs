@@ -63,16 +63,19 @@ mod scene;
 mod suggestion;
 mod texture;
 
-pub use accel::AccelKind;
+pub use accel::{AccelKind, BvhOptions, EmbreeOptions, EmbreeQuality, KdTreeOptions};
 pub use assets::MeshData;
+pub use attribute::AttributeValues;
 pub use error::{Error, ErrorKind, Result};
-pub use film::{Image, Layer, LayerInfo};
-pub use import::{ImportOptions, ImportReport};
-pub use render::{Overrides, Progress, Settings, Stats};
+pub use film::{Crop, DroppedSample, Image, Layer, LayerInfo, LayerSet};
+pub use import::{ImportOptions, ImportReport, Outcome, ReportEntry};
+pub use integrator::RayCounts;
+pub use render::{ExrOverrides, Overrides, Progress, Settings, Shard, Stats, TrainedGuide};
 pub use renderer::{
     Assignment, LayerView, PreparedRender, Renderer, Rendering, StateOptions, StopHandle, Watch, changed_settings,
     default_outputs, layers_of,
 };
+pub use sampling::SamplerKind;
 
 /// What the packages of this repository need beyond the library's interface: it may change with every version.
 #[doc(hidden)]

@@ -1,7 +1,5 @@
 //! The glasses and bottles of `scenes/glassware.json`: every crossing is found, and what is clear loses no light.
 
-use std::path::Path;
-
 use serde_json::{Value, json};
 use steradian::desc::{ProfileDesc, SceneDesc, ShapeDesc};
 use steradian::internal::geometry::{Profile, Revolution};

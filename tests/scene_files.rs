@@ -1,7 +1,6 @@
 //! The content of scene files reaches the compiled scene: schema, transforms, meshes, materials, instances, lights.
 
 use std::os::unix::fs::MetadataExt;
-use std::path::Path;
 
 use image::ImageBuffer;
 use serde_json::{Value, json};

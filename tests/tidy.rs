@@ -207,8 +207,9 @@ fn every_known_flaw_has_its_tests() {
     let files = sources(&["src", "crates", "tests"]);
     let is_test = |name: &str| {
         files.iter().any(|file| {
-            file.text.contains(&format!("#[test]\n    fn {name}()"))
-                || file.text.contains(&format!("#[test]\nfn {name}()"))
+            // A test, or a check of the catalogue of stability, of which each has one.
+            let forms = [format!("#[test]\n    fn {name}()"), format!("#[test]\nfn {name}()"), format!("\" {name} \"")];
+            forms.iter().any(|form| file.text.contains(form))
         })
     };
     let rows: Vec<&str> = text

@@ -1,7 +1,6 @@
 //! Help, errors and documents are in the field's plain English: phrases that are not.
 
 use std::fs;
-use std::path::Path;
 
 use proc_macro2::{TokenStream, TokenTree};
 

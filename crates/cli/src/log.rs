@@ -2,10 +2,11 @@
 
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io::{IsTerminal, Read, Write};
+use std::io::{Read, Write};
 use std::path::Path;
 use std::sync::{Mutex, OnceLock};
 
+use anstream::AutoStream;
 use indicatif::ProgressBar;
 use serde_json::json;
 use steradian::internal::farm::message_line;
@@ -115,20 +116,13 @@ fn is_log(path: &Path) -> std::io::Result<bool> {
     Ok(start.is_empty() || is_dated || start.starts_with(br#"{"level":""#))
 }
 
-/// Whether stderr has colours.
+/// Whether stderr has colours. By itself, `NO_COLOR` takes precedence over `CLICOLOR_FORCE`, which takes precedence over
+/// the terminal.
 pub fn colored(choice: ColorChoice) -> bool {
-    let variable = |name: &str| std::env::var(name).unwrap_or_default();
-    decide_color(choice, &variable, std::io::stderr().is_terminal())
-}
-
-/// `NO_COLOR` takes precedence over `CLICOLOR_FORCE`, which takes precedence over the terminal.
-fn decide_color(choice: ColorChoice, variable: &dyn Fn(&str) -> String, terminal: bool) -> bool {
     match choice {
         ColorChoice::Always => true,
         ColorChoice::Never => false,
-        ColorChoice::Auto if !variable("NO_COLOR").is_empty() => false,
-        ColorChoice::Auto if !["", "0"].contains(&variable("CLICOLOR_FORCE").as_str()) => true,
-        ColorChoice::Auto => terminal && variable("TERM") != "dumb",
+        ColorChoice::Auto => AutoStream::choice(&std::io::stderr()) != anstream::ColorChoice::Never,
     }
 }
 
@@ -236,26 +230,6 @@ impl Visit for Text {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn colours_follow_the_option_then_the_environment_then_the_terminal() {
-        let with = |name: &'static str, value: &'static str| {
-            move |variable: &str| if variable == name { value.to_owned() } else { String::new() }
-        };
-        let none = |_: &str| String::new();
-        use ColorChoice::{Always, Auto, Never};
-        assert!(decide_color(Auto, &none, true) && !decide_color(Auto, &none, false));
-        assert!(
-            !decide_color(Auto, &with("NO_COLOR", "1"), true) && decide_color(Always, &with("NO_COLOR", "1"), false)
-        );
-        assert!(
-            decide_color(Auto, &with("CLICOLOR_FORCE", "1"), false)
-                && !decide_color(Auto, &with("CLICOLOR_FORCE", "0"), false)
-        );
-        assert!(!decide_color(Auto, &with("TERM", "dumb"), true) && !decide_color(Never, &none, true));
-        let both = |_: &str| "1".to_owned();
-        assert!(!decide_color(Auto, &both, true));
-    }
 
     #[test]
     fn messages_are_text_or_json() {

@@ -15,7 +15,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-pub use outcome::{Bound, Measure, Outcome, Plot, Status};
+pub use outcome::{Bound, Faults, Measure, Outcome, Plot, Status};
 pub use report::StabilityReport;
 
 use super::Watch;
@@ -243,9 +243,10 @@ pub(crate) mod testing {
 
     #[test]
     fn failures_leave_pictures_and_say_what_broke() {
-        let outcome = Outcome::new().at_most("error", 2.0, 1.0).none("lost", 0).pictures("grid", 1, &[1.0], &[3.0]);
+        let lost = Faults::of(&[1, 8, 9], |&ray| usize::from(ray > 7), |ray| format!("ray {ray}"));
+        let outcome = Outcome::new().at_most("error", 2.0, 1.0).none("lost", lost).pictures("grid", 1, &[1.0], &[3.0]);
         let report = CheckReport { id: "Z1", name: "n", setup: "s", status: outcome.status(), outcome, seconds: 0.0 };
-        assert_eq!(report::broken(&report), "error is 2, must be ≤ 1");
+        assert_eq!(report::broken(&report), "error is 2, must be ≤ 1; lost is 2, must be ≤ 0 (the first: ray 8)");
         let folder = tempfile::tempdir().unwrap();
         assert_eq!(
             report::write_evidence(folder.path(), &report).unwrap(),

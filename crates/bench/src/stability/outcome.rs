@@ -1,5 +1,8 @@
 //! What a check has measured, and whether that is good enough.
 
+use std::ops::AddAssign;
+
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::film::Image;
@@ -39,6 +42,48 @@ pub struct Measure {
     pub value: f64,
     /// What it must be.
     pub bound: Bound,
+    /// Of a count of faults: the first of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub counterexample: Option<String>,
+}
+
+/// How many of many cases are at fault, and the first of those in words.
+#[derive(Clone, Debug, Default)]
+pub struct Faults {
+    /// How many.
+    pub count: usize,
+    /// The first one: the input, such as a ray, with what came of it.
+    pub first: Option<String>,
+}
+
+impl Faults {
+    /// Counts the faults of each item in parallel.
+    pub fn of<T: Sync>(items: &[T], faults: impl Fn(&T) -> usize + Sync, describe: impl FnOnce(&T) -> String) -> Self {
+        let count = items.par_iter().map(&faults).sum();
+        let first = if count == 0 { None } else { items.iter().find(|item| faults(item) > 0).map(describe) };
+        Self { count, first }
+    }
+
+    /// Counts one fault unless `holds`.
+    pub fn require(&mut self, holds: bool, describe: impl FnOnce() -> String) {
+        if !holds {
+            self.count += 1;
+            self.first.get_or_insert_with(describe);
+        }
+    }
+}
+
+impl From<usize> for Faults {
+    fn from(count: usize) -> Self {
+        Self { count, first: None }
+    }
+}
+
+impl AddAssign for Faults {
+    fn add_assign(&mut self, other: Self) {
+        self.count += other.count;
+        self.first = self.first.take().or(other.first);
+    }
 }
 
 /// How a check ended.
@@ -89,7 +134,7 @@ impl Outcome {
     }
 
     fn with(mut self, what: impl Into<String>, value: f64, bound: Bound) -> Self {
-        self.measures.push(Measure { what: what.into(), value, bound });
+        self.measures.push(Measure { what: what.into(), value, bound, counterexample: None });
         self
     }
 
@@ -113,8 +158,16 @@ impl Outcome {
 
     /// A count that must be zero.
     #[must_use]
-    pub fn none(self, what: impl Into<String>, count: usize) -> Self {
-        self.with(what, count as f64, Bound::AtMost(0.0))
+    pub fn none(self, what: impl Into<String>, faults: impl Into<Faults>) -> Self {
+        let faults = faults.into();
+        self.with(what, faults.count as f64, Bound::AtMost(0.0)).shown_by(&faults)
+    }
+
+    /// Adds the counterexample of the last number.
+    #[must_use]
+    pub fn shown_by(mut self, faults: &Faults) -> Self {
+        self.measures.iter_mut().last().into_iter().for_each(|m| m.counterexample.clone_from(&faults.first));
+        self
     }
 
     /// A number without a bound.

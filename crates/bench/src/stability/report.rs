@@ -225,7 +225,8 @@ pub fn broken(report: &CheckReport) -> String {
             Bound::Within(low, high) => format!("in [{}, {}]", number(low), number(high)),
             Bound::Any => "a number".into(),
         };
-        format!("{} is {}, must be {must}", m.what, number(m.value))
+        let example = m.counterexample.as_ref().map_or(String::new(), |text| format!(" (the first: {text})"));
+        format!("{} is {}, must be {must}{example}", m.what, number(m.value))
     });
     lines.collect::<Vec<_>>().join("; ")
 }

@@ -4,11 +4,11 @@ use std::f64::consts::TAU;
 
 use super::{count, differing, oracle_hits};
 use crate::accel::LinearAccel;
-use crate::geometry::{Analytic, Disk, Geometry, Mesh, Shape, Sphere, TransformedShape};
+use crate::geometry::{Analytic, Disk, Geometry, Hit, Mesh, Shape, Sphere, TransformedShape};
 use crate::math::{DMat3, DVec3, Ray, Transform, Vec3};
 use crate::stability::geometry::{Rng, cube, meshes, ray, ray_through, soup, transform, world};
 use crate::stability::scenes::{all, own};
-use crate::stability::{Effort, Outcome, Plot};
+use crate::stability::{Effort, Faults, Outcome, Plot};
 
 fn corner(mesh: &Mesh, i: usize) -> DVec3 {
     DVec3::from_array(mesh.positions()[i].map(f64::from))
@@ -23,9 +23,9 @@ fn judged(outcome: Outcome, geometry: &Geometry, rays: Vec<Ray>) -> Outcome {
         hits as f64 / rays.len() as f64,
         0.4,
     );
-    let lost =
-        |outcome: Outcome, name: &str, lost| outcome.none(format!("answers of {name} that differ in a bit"), lost);
-    own(geometry).into_iter().fold(outcome, |outcome, (name, accel)| lost(outcome, name, differing(&*accel, &rays)))
+    own(geometry).into_iter().fold(outcome, |outcome, (name, accel)| {
+        outcome.none(format!("answers of {name} that differ in a bit"), differing(name, &*accel, &rays))
+    })
 }
 
 pub(super) fn f4_grazed_boxes(effort: Effort) -> Outcome {
@@ -90,7 +90,8 @@ pub(super) fn f5_extreme_points(effort: Effort) -> Outcome {
         let rays = oracle_hits(&LinearAccel::new(&geometry), rays);
         let hits = rays.iter().filter(|(_, hit)| hit.is_some()).count();
         outcome = outcome.at_least(format!("hits at distance {distance}"), hits as f64, 0.2 * rays.len() as f64);
-        let differ: usize = all(&geometry).iter().map(|(_, accel)| differing(&**accel, &rays)).sum();
+        let mut differ = Faults::default();
+        all(&geometry).iter().for_each(|(name, accel)| differ += differing(name, &**accel, &rays));
         outcome = outcome.none(format!("answers of six accelerators that differ at distance {distance}"), differ);
     }
     outcome
@@ -101,23 +102,24 @@ pub(super) fn f6_far_cameras(effort: Effort) -> Outcome {
     let geometry = world(vec![Shape::Analytic(TransformedShape::new(sphere, Transform::IDENTITY))]);
     let accels = all(&geometry);
     let mut rng = Rng::new(36);
-    let (mut differ, mut missed, mut sure) = (0, 0, 0);
+    let (mut differ, mut missed, mut sure) = (Faults::default(), Faults::default(), 0);
     let mut curve = Vec::new();
     for exponent in 1..=9 {
         let distance = 10f64.powi(exponent);
         let mut at_sphere = || ray_through(distance * rng.direction(), 0.9 * rng.unit().cbrt() * rng.direction());
         let rays = (0..effort.pick(1_000, 100_000)).map(|_| at_sphere()).collect();
         let rays = oracle_hits(&LinearAccel::new(&geometry), rays);
-        let wrong: usize = accels.iter().map(|(_, accel)| differing(&**accel, &rays)).sum();
-        differ += wrong;
-        curve.push((distance, wrong as f64 / (accels.len() * rays.len()) as f64));
+        let before = differ.count;
+        accels.iter().for_each(|(name, accel)| differ += differing(name, &**accel, &rays));
+        curve.push((distance, (differ.count - before) as f64 / (accels.len() * rays.len()) as f64));
         // What f32 has made of the ray may pass the sphere.
         let meets = |ray: &Ray| {
             let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
             o.reject_from(d).length() < 0.999
         };
         sure += count(&rays, |(ray, _)| meets(ray));
-        missed += count(&rays, |(ray, hit)| meets(ray) && hit.is_none());
+        let is_missed = |(ray, hit): &(Ray, Option<Hit>)| usize::from(meets(ray) && hit.is_none());
+        missed += Faults::of(&rays, is_missed, |(ray, _)| format!("{ray:?}"));
     }
     Outcome::new()
         .at_least("rays that surely meet the sphere", sure as f64, effort.pick(5e3, 5e5))

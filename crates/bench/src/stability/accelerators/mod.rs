@@ -12,7 +12,7 @@ use visits::f9_visits;
 
 use super::geometry::{Rng, grid, ids, ray, world};
 use super::scenes::{all, at_times, build, moving_scene, own, packets, path_rays, same, scenes, test_rays};
-use super::{Effort, Outcome};
+use super::{Effort, Faults, Outcome};
 use crate::accel::{AccelKind, Accelerator, Coherence, LinearAccel};
 use crate::geometry::{Geometry, Hit, Shape};
 use crate::id::ShapeId;
@@ -52,8 +52,18 @@ fn count<T: Sync>(items: &[T], property: impl Fn(&T) -> bool + Sync) -> usize {
 }
 
 /// How often an accelerator other than Embree answers otherwise than expected, in any bit.
-fn differing(accel: &dyn Accelerator, rays: &[(Ray, Option<Hit>)]) -> usize {
-    count(rays, |(ray, expected)| accel.intersect(ray) != *expected || accel.occluded(ray) != expected.is_some())
+fn differing(name: &str, accel: &dyn Accelerator, rays: &[(Ray, Option<Hit>)]) -> Faults {
+    let differs = |ray: &Ray, expected: &Option<Hit>| {
+        accel.intersect(ray) != *expected || accel.occluded(ray) != expected.is_some()
+    };
+    Faults::of(
+        rays,
+        |(ray, expected)| usize::from(differs(ray, expected)),
+        |(ray, expected)| {
+            let (found, occluded) = (accel.intersect(ray), accel.occluded(ray));
+            format!("{name}: {ray:?} has {found:?} (occluded: {occluded}) in place of {expected:?}")
+        },
+    )
 }
 
 /// The oracle's hits.
@@ -84,8 +94,8 @@ fn cases(count: usize) -> Vec<Case> {
 /// How Embree's answers compare with the oracle's.
 #[derive(Default)]
 struct Agreement {
-    flags: usize,
-    distances: usize,
+    flags: Faults,
+    distances: Faults,
     ties: usize,
 }
 
@@ -96,9 +106,12 @@ impl Agreement {
         for ((ray, expected), found) in rays.iter().zip(found) {
             match (found, expected) {
                 (Some(a), Some(b)) if same(geometry, ray, &a, b) => agreement.ties += usize::from(ids(&a) != ids(b)),
-                (Some(_), Some(_)) => agreement.distances += 1,
                 (None, None) => {}
-                _ => agreement.flags += 1,
+                _ => {
+                    let of_both = found.is_some() && expected.is_some();
+                    let faults = if of_both { &mut agreement.distances } else { &mut agreement.flags };
+                    faults.require(false, || format!("{ray:?} has {found:?} in place of {expected:?}"));
+                }
             }
         }
         agreement
@@ -108,7 +121,7 @@ impl Agreement {
 fn f1_closest_hits(effort: Effort) -> Outcome {
     let cases = cases(effort.pick(250, 10_000));
     let (mut rays, mut hits, mut poor) = (0, 0, 0);
-    let mut counts: Vec<(&str, usize)> = Vec::new();
+    let mut counts: Vec<(&str, Faults)> = Vec::new();
     let mut rounding = [Agreement::default(), Agreement::default()];
     for Case { geometry, expected } in &cases {
         let found = expected.iter().filter(|(_, hit)| hit.is_some()).count();
@@ -116,7 +129,7 @@ fn f1_closest_hits(effort: Effort) -> Outcome {
         hits += found;
         poor += usize::from(100 * found < expected.len() && !geometry.shapes.is_empty());
         for (name, accel) in own(geometry) {
-            let lost = differing(&*accel, expected);
+            let lost = differing(name, &*accel, expected);
             match counts.iter_mut().find(|(n, _)| *n == name) {
                 Some((_, count)) => *count += lost,
                 None => counts.push((name, lost)),
@@ -124,7 +137,9 @@ fn f1_closest_hits(effort: Effort) -> Outcome {
         }
         for (sum, accel) in rounding.iter_mut().zip([build(AccelKind::EMBREE, geometry), packets(geometry)]) {
             let Agreement { flags, distances, ties } = Agreement::of(&*accel, geometry, expected);
-            *sum = Agreement { flags: sum.flags + flags, distances: sum.distances + distances, ties: sum.ties + ties };
+            sum.flags += flags;
+            sum.distances += distances;
+            sum.ties += ties;
         }
     }
     let outcome =
@@ -194,13 +209,17 @@ fn f3_any_hit(effort: Effort) -> Outcome {
     let mut rng = Rng::new(13);
     let mut all_scenes = scenes();
     all_scenes.push(("moving", moving_scene(&mut rng)));
-    let (mut total, mut outcome) = (0, Vec::<(&str, usize)>::new());
-    for (_, geometry) in &all_scenes {
+    let (mut total, mut outcome) = (0, Vec::<(&str, Faults)>::new());
+    for (scene, geometry) in &all_scenes {
         let rays = test_rays(&mut rng, geometry, effort.pick(1_000, 60_000));
         let rays = at_times(&mut rng, rays);
         total += rays.len();
         for (name, accel) in all(geometry) {
-            let wrong = rays.par_iter().map(|ray| contradictions(geometry, &*accel, ray)).sum::<usize>();
+            let describe = |ray: &Ray| {
+                let (found, occluded) = (accel.intersect(ray), accel.occluded(ray));
+                format!("{scene}: {ray:?}, or cut at its hit, has {found:?} (occluded: {occluded})")
+            };
+            let wrong = Faults::of(&rays, |ray| contradictions(geometry, &*accel, ray), describe);
             match outcome.iter_mut().find(|(n, _)| *n == name) {
                 Some((_, count)) => *count += wrong,
                 None => outcome.push((name, wrong)),
@@ -210,11 +229,12 @@ fn f3_any_hit(effort: Effort) -> Outcome {
     // A ray through an edge, nearly parallel to a side of the box around the triangle, may enter that box some ulp
     // behind the triangle's own distance.
     let result = Outcome::new().record("rays", total as f64);
-    let judged = |result: Outcome, (name, wrong): (&str, usize)| match (name, wrong) {
-        ("embree", 1..) => result
-            .at_most("contradictions of embree in a million rays", 1e6 * wrong as f64 / total as f64, 10.0)
+    let judged = |result: Outcome, (name, wrong): (&str, Faults)| match (name, wrong.count) {
+        ("embree", count @ 1..) => result
+            .at_most("contradictions of embree in a million rays", 1e6 * count as f64 / total as f64, 10.0)
+            .shown_by(&wrong)
             .short(format!(
-                "{wrong} of {total} rays pass an edge nearly parallel to a side of the box around its triangle, a \
+                "{count} of {total} rays pass an edge nearly parallel to a side of the box around its triangle, a \
                  fraction of a rounding outside: Embree enters the box behind the distance of its own hit (by 75 ulp \
                  on one ray), so that an interval cut there leaves the hit out; wished for is none"
             )),

@@ -12,7 +12,7 @@ use meshes::{e3_garbage_meshes, e4_identical_triangles};
 use rays::{e1_invalid_rays, e2_zero_directions, e5_ends_of_intervals, e6_steps_past_hits};
 use scaling::{e7_scenes_of_every_size, e11_scenes_in_every_place};
 
-use super::{Effort, Outcome};
+use super::{Effort, Faults, Outcome};
 
 checks! {
     "E1" e1_invalid_rays "what is not a ray hits nothing":

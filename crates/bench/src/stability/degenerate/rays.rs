@@ -1,6 +1,6 @@
 //! Rays that are none, and rays at the end of what is one.
 
-use super::{Effort, Outcome};
+use super::{Effort, Faults, Outcome};
 use crate::accel::{AccelKind, Accelerator};
 use crate::geometry::{Geometry, Hit, Shape};
 use crate::math::float::{SMALLEST_NORMAL, step_past};
@@ -157,7 +157,7 @@ pub(super) fn e2_zero_directions(effort: Effort) -> Outcome {
 pub(super) fn e5_ends_of_intervals(_: Effort) -> Outcome {
     let geometry = meshes(vec![triangle(DVec3::ZERO, DVec3::X, DVec3::Y)]);
     let accels = everyone(&geometry);
-    let (mut cases, mut wrong) = (0, 0);
+    let (mut cases, mut wrong) = (0, Faults::default());
     let on = Ray::new(Vec3::new(0.25, 0.25, 0.0), Vec3::Z);
     let mut worst: f32 = 0.0;
     for (name, accel) in &accels {
@@ -166,7 +166,8 @@ pub(super) fn e5_ends_of_intervals(_: Effort) -> Outcome {
         let mut judge = |ray: Ray, expected: bool| {
             for (hits, occluded) in all_answers(&**accel, &[ray]) {
                 cases += 1;
-                wrong += usize::from((hits[0].is_some(), occluded[0]) != (expected, expected));
+                let answer = (hits[0].is_some(), occluded[0]);
+                wrong.require(answer == (expected, expected), || format!("{name}: {ray:?}: hit, occluded: {answer:?}"));
             }
         };
         for exponent in -20..=20 {

@@ -9,7 +9,7 @@ mod spheres;
 mod triangles;
 
 use super::geometry::{Closest, Rng, closest, ray_through};
-use super::{Effort, Outcome};
+use super::{Effort, Faults, Outcome};
 use crate::accel::{self, Accelerator};
 use crate::geometry::{Geometry, Mesh, SpawnPoint, SurfaceInteraction};
 use crate::id::PrimId;
@@ -137,11 +137,11 @@ struct Leavings {
     rays: usize,
     segments: usize,
     /// Closest hits that stand in `f64`.
-    found_again: usize,
+    found_again: Faults,
     /// Rays without an end that any-hit queries call occluded.
-    occluded: usize,
+    occluded: Faults,
     /// The same of segments to free points.
-    segments_occluded: usize,
+    segments_occluded: Faults,
     retraces: usize,
 }
 
@@ -158,12 +158,12 @@ impl Leavings {
         let ray = si.spawn(direction.as_vec3());
         let Closest { found, retraces } = closest(accel, geometry, &ray);
         self.rays += 1;
-        self.found_again += usize::from(found.is_some());
-        self.occluded += usize::from(accel.occluded(&ray));
+        self.found_again.require(found.is_none(), || format!("{ray:?} from {si:?} meets {found:?}"));
+        self.occluded.require(!accel.occluded(&ray), || format!("{ray:?} from {si:?}"));
         self.retraces += retraces;
         if let Some(segment) = free_segment(si, direction, distance) {
             self.segments += 1;
-            self.segments_occluded += usize::from(accel.occluded(&segment));
+            self.segments_occluded.require(!accel.occluded(&segment), || format!("{segment:?} from {si:?}"));
         }
     }
 
@@ -178,9 +178,12 @@ impl Leavings {
         outcome
             .at_least(format!("{what}: rays"), self.rays as f64, 1_000.0)
             .at_least(format!("{what}: segments"), self.segments as f64, 500.0)
-            .at_most(format!("{what}: found again"), self.found_again as f64, allowed)
-            .at_most(format!("{what}: rays called occluded"), self.occluded as f64, allowed)
-            .at_most(format!("{what}: segments called occluded"), self.segments_occluded as f64, allowed)
+            .at_most(format!("{what}: found again"), self.found_again.count as f64, allowed)
+            .shown_by(&self.found_again)
+            .at_most(format!("{what}: rays called occluded"), self.occluded.count as f64, allowed)
+            .shown_by(&self.occluded)
+            .at_most(format!("{what}: segments called occluded"), self.segments_occluded.count as f64, allowed)
+            .shown_by(&self.segments_occluded)
     }
 
     fn retraces_per_ray(&self) -> f64 {
