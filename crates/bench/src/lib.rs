@@ -1,5 +1,5 @@
-//! Benchmarks of the renderer Steradian: accelerators compared on the same rays: record, replay, check, report; error against time; cost as scenes grow; and
-//! numerical stability.
+//! Benchmarks of the renderer Steradian: accelerators compared on the same rays (record, replay, check, report); error
+//! against time; cost as scenes grow; and numerical stability.
 
 pub mod agreement;
 mod child;

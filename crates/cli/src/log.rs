@@ -116,7 +116,7 @@ fn is_log(path: &Path) -> std::io::Result<bool> {
     Ok(start.is_empty() || is_dated || start.starts_with(br#"{"level":""#))
 }
 
-/// Whether stderr has colours. By itself, `NO_COLOR` takes precedence over `CLICOLOR_FORCE`, which takes precedence over
+/// Whether stderr has colours. If that is not chosen, `NO_COLOR` takes precedence over `CLICOLOR_FORCE`, and that over
 /// the terminal.
 pub fn colored(choice: ColorChoice) -> bool {
     match choice {
