@@ -122,7 +122,7 @@ pub(super) fn g8_visible_normals(effort: Effort) -> Outcome {
             densities.iter().copied().fold(1.0, f64::min),
             sidak_level(densities.len()),
         )
-        .none("normals that are no unit vectors of the upper side", found.iter().map(|n| n.broken).sum())
+        .none("normals that are no unit vectors of the upper side", found.iter().map(|n| n.broken).sum::<usize>())
         .at_least("least cosine with the direction", found.iter().map(|n| n.least_cos).fold(1.0, f64::min), 0.0)
         .record("fraction of normals seen from behind", hidden);
     if worst.p_value >= level {

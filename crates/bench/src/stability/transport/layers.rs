@@ -125,7 +125,7 @@ pub(super) fn i10_motion(effort: Effort) -> Outcome {
         let image = render(&before_a_sky(16, rest));
         pixels(&image).zip(&still).filter(|(a, b)| a != *b).count()
     });
-    let different = different.sum();
+    let different: usize = different.sum();
     let outcome = Outcome::new().none("pixels of cards with two equal steps that differ from those at rest", different);
     tests.judge_means(outcome, effort.pick(1.0, 0.15))
 }
