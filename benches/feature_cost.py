@@ -97,6 +97,10 @@ FEATURES = {
             ("src/geometry/mod.rs", r"Self::Analytic\(placed\) => placed\.interaction_with\(detail, ray, hit\),", "Self::Analytic(_) => " + NEVER + ","),
         ],
     ),
+    "curves and points": (
+        "`Shape::Curves`, `Shape::Points`",
+        [("src/geometry/mod.rs", r"Self::Curves\(_\) \| Self::Points\(_\) => self\.many_interaction_and_dp_dv\(detail, ray, hit\)\.map\(.*\),", "Self::Curves(_) | Self::Points(_) => " + NEVER + ",")],
+    ),
     "instances": (
         "the instance in a hit",
         [
@@ -120,8 +124,8 @@ FEATURES = {
     "layers beside the colour": (
         "`Context::wants_surfaces` and the like, `LayerSet`",
         [
-            ("src/integrator/path/mod.rs", r"self\.config\.needs != SurfaceAovs::default\(\)", "false"),
-            ("src/integrator/path/mod.rs", r"self\.config\.light_aovs\.by_scattering \|\| self\.config\.needs\.features", "false"),
+            ("src/integrator/path/mod.rs", r"self\.config\.surface_aovs != SurfaceAovs::default\(\)", "false"),
+            ("src/integrator/path/mod.rs", r"self\.config\.light_aovs\.by_scattering \|\| self\.config\.surface_aovs\.features", "false"),
             ("src/integrator/path/mod.rs", r"self\.light_aovs\.count\(\) > 0", "false"),
             ("src/film/tile.rs", r"self\.layout\.beside_color\(\)", "false"),
         ],
