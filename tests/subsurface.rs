@@ -2,17 +2,17 @@
 
 use serde_json::{Value, json};
 use steradian::ErrorKind;
-use steradian::accel::AccelKind;
-use steradian::film::{Image, LayerKind, LayerSet};
-use steradian::math::{DVec3, Rng};
-use steradian::render::Overrides;
+use steradian::internal::accel::AccelKind;
+use steradian::internal::film::{Image, LayerKind, LayerSet};
+use steradian::internal::math::{DVec3, Rng};
+use steradian::internal::render::Overrides;
 
 use crate::bad_input::{assert_error, assert_faults};
 use crate::layers::assert_sums;
 use crate::participating_media::hg;
 use crate::util::folder::{Folder, good_scene, set};
 use crate::util::render::{
-    AssertIs, Estimate, assert_blocks_agree, block_means, merge, pixels, prepare, probe, render, render_with,
+    Estimate, assert_blocks_agree, block_means, merge, pixels, prepare, probe, render, render_with,
 };
 
 /// A material whose light all enters, as far as the layer on top lets it.
