@@ -92,7 +92,7 @@ class Engine(bpy.types.RenderEngine):
         try:
             image = steradian.render(loaded, progress=progress, picture=picture, picture_every=2.0)
             passes.store_all(result, view_layer, image)
-            passes.store_mattes(result, view_layer, image)
+            passes.store_mattes(result, self.get_result(), view_layer, image)
         finally:
             self.end_result(result)
 

@@ -7,6 +7,7 @@ of an image.
 from dataclasses import dataclass, replace
 from typing import Any
 
+import bpy
 import numpy as np
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
@@ -112,6 +113,12 @@ class Fields:
     def named(self, node, *names):
         """The fields of a node's inputs."""
         return [self.socket(node.inputs[name]) for name in names]
+
+
+def uses_nodes(owner):
+    """Whether a material, world or lamp is made of nodes; from Blender 5 on, all materials and worlds are."""
+    always = bpy.app.version >= (5, 0, 0) and not isinstance(owner, bpy.types.Light)
+    return owner.node_tree is not None and (always or owner.use_nodes)
 
 
 def origin(socket):

@@ -3,6 +3,7 @@
 import math
 
 from . import transforms
+from .fields import origin, uses_nodes
 
 # A boundary that changes nothing: lamps do not stop light.
 CLEAR = "steradian_clear"
@@ -14,11 +15,11 @@ def strength(light, report):
     color = [c * light.energy * 2 ** getattr(light, "exposure", 0) for c in light.color]
     if getattr(light, "use_temperature", False):
         color = [c * t for c, t in zip(color, light.temperature_color)]
-    if not light.use_nodes or light.node_tree is None:
+    if not uses_nodes(light):
         return color
     output = next((node for node in light.node_tree.nodes if node.type == "OUTPUT_LIGHT" and node.is_active_output), None)
-    link = output.inputs["Surface"].links[0] if output and output.inputs["Surface"].is_linked else None
-    emission = link.from_node if link else None
+    source = origin(output.inputs["Surface"]) if output else None
+    emission = source.node if source else None
     if emission is None or emission.type != "EMISSION":
         report.warn(f"light {light.name}", "its nodes are left out")
         return color

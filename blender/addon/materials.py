@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from .fields import LUMINANCE, Field, Fields, Unsupported, constant, grey, origin
+from .fields import LUMINANCE, Field, Fields, Unsupported, constant, grey, origin, uses_nodes
 
-DIFFUSE = {"type": "diffuse", "albedo": 0.5}
+# What Blender has where no material is.
+DIFFUSE = {"type": "diffuse", "albedo": 0.8}
 BLACK = {"type": "diffuse", "albedo": 0.0}
 
 
@@ -96,7 +97,7 @@ class _Translation:
 
     def _surface(self):
         material = self._material
-        tree = material.node_tree if material.use_nodes else None
+        tree = material.node_tree if uses_nodes(material) else None
         if tree is None:
             return Surface(self._add(self._plain(material)))
         output = tree.get_output_node("CYCLES") or tree.get_output_node("ALL")

@@ -73,8 +73,8 @@ def store_all(result, view_layer, image):
         store(layer, each.name, image[each.layer])
 
 
-def store_mattes(result, view_layer, image):
-    """Puts Cryptomatte into a result, with its names."""
+def store_mattes(result, whole, view_layer, image):
+    """Puts Cryptomatte into a result, and its names into the metadata of the whole one."""
     layer = result.layers[0]
     for kind, found in matte_passes(view_layer).items():
         matte = image.cryptomatte(MATTES[kind], depth=matte_depth(view_layer))
@@ -83,4 +83,4 @@ def store_mattes(result, view_layer, image):
         for key, value in matte["metadata"].items():
             # Blender names mattes after the view layer.
             text = f"{view_layer.name}.{value}" if key.endswith("/name") else value
-            result.stamp_data_add_field(key, text)
+            whole.stamp_data_add_field(key, text)

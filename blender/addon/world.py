@@ -5,7 +5,7 @@ import math
 from mathutils import Euler, Matrix
 
 from . import transforms
-from .fields import Fields, Unsupported, constant, origin
+from .fields import Fields, Unsupported, constant, origin, uses_nodes
 
 # Steradian's axes of an image (x, y up, -z in its middle) as those of Blender (middle +x, up +z).
 AXES = Matrix(((0, 0, -1, 0), (-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0, 1)))
@@ -16,7 +16,7 @@ def convert(world, images, report):
     if world is None:
         return None
     about = f"world {world.name}"
-    if not world.use_nodes or world.node_tree is None:
+    if not uses_nodes(world):
         return _constant(list(world.color))
     output = world.node_tree.get_output_node("CYCLES") or world.node_tree.get_output_node("ALL")
     if output is None:

@@ -38,10 +38,16 @@ def reset():
         scene.steradian.property_unset(name)
     bpy.context.view_layer.steradian.layers = set()
     scene.world = bpy.data.worlds.new("World")
-    scene.world.use_nodes = True
+    with_nodes(scene.world)
     background = scene.world.node_tree.nodes["Background"]
     background.inputs["Color"].default_value, background.inputs["Strength"].default_value = (1, 1, 1, 1), 0
     return scene
+
+
+def with_nodes(owner):
+    """Makes a material or world one of nodes, as all are from Blender 5 on."""
+    if bpy.app.version < (5, 0, 0):
+        owner.use_nodes = True
 
 
 def link(data, name="thing", location=(0, 0, 0)):
@@ -87,7 +93,7 @@ def sky(strength, color=(1, 1, 1)):
 def shader(kind, name="material", **values):
     """A material of one shader node: (material, node). Values are those of its inputs."""
     material = bpy.data.materials.new(name)
-    material.use_nodes = True
+    with_nodes(material)
     tree = material.node_tree
     tree.nodes.clear()
     node, output = tree.nodes.new(kind), tree.nodes.new("ShaderNodeOutputMaterial")
