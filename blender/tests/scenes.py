@@ -190,7 +190,7 @@ def picture(engine, samples, name="picture"):
     return values
 
 
-def both(steradian=64, cycles=256):
+def both(steradian=64, cycles=96):
     """The pictures by Steradian and by Cycles."""
     return picture("STERADIAN", steradian), picture("CYCLES", cycles)
 

@@ -68,13 +68,15 @@ LAMPS = {
 
 @pytest.mark.parametrize("name", LAMPS)
 def test_lamps_light_a_diffuse_room(name):
+    small()
     scenes.room()
     kind, location, target, values = LAMPS[name]
     scenes.lamp(kind, location, target, **values)
-    agree(steradian=64, cycles=128)
+    agree(cycles=64)
 
 
 def test_the_sun_and_the_sky():
+    small()
     scenes.plane(20, material=scenes.diffuse((0.5, 0.5, 0.5)))
     scenes.box((1, 1, 1), (0, 0, 0.5), scenes.diffuse((0.2, 0.6, 0.3), "green"))
     scenes.lamp("SUN", (0, 0, 5), (1, 2, 0), energy=2, angle=0.1)
