@@ -7,11 +7,10 @@ use pyo3::exceptions::{PyKeyError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyBytes, PyDict};
 use serde_json::Value;
-use steradian::Rendering;
-use steradian::bench::error::flip;
 use steradian::desc::{OutputDesc, PixelTypeDesc, ViewDesc};
-use steradian::film::{Image, Layer};
-use steradian::output::{self, RenderInfo};
+use steradian::internal::output::{self, RenderInfo};
+use steradian::{Image, Layer, Rendering};
+use steradian_bench::error::flip;
 
 use crate::convert::{from_json, picture};
 use crate::errors::OrRaise;

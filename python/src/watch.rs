@@ -8,9 +8,7 @@ use std::time::{Duration, Instant};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict};
-use steradian::film::Image;
-use steradian::render::Progress;
-use steradian::{Renderer, Rendering, StopHandle};
+use steradian::{Image, Progress, Renderer, Rendering, StopHandle};
 
 use crate::errors::{OrRaise, raise};
 use crate::image::{PyImage, Source};

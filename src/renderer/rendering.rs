@@ -87,6 +87,7 @@ impl Rendering {
     }
 
     /// The metadata of files.
+    #[doc(hidden)]
     pub fn info(&self) -> &RenderInfo {
         &self.info
     }
@@ -102,6 +103,7 @@ impl Rendering {
     }
 
     /// What denoising did, if the picture is denoised.
+    #[doc(hidden)]
     pub fn denoised(&self) -> Option<&Report> {
         self.denoised.as_ref().map(|denoised| &denoised.report)
     }
