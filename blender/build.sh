@@ -18,8 +18,9 @@ cp blender/addon/*.py "$work/addon"
 cp LICENSE-MIT LICENSE-APACHE python/NOTICE "$work/addon"
 cp "$wheel" "$work/addon/wheels"
 name=$(basename "$wheel")
-sed "s|^# build.sh adds.*|wheels = [\"./wheels/$name\"]|" blender/addon/blender_manifest.toml > "$work/addon/blender_manifest.toml"
-version=$(sed -n 's/^version = "\(.*\)"/\1/p' blender/addon/blender_manifest.toml)
+manifest=blender/addon/blender_manifest.toml
+sed "s|^# build.sh adds.*|wheels = [\"./wheels/$name\"]|" "$manifest" > "$work/addon/blender_manifest.toml"
+version=$(sed -n 's/^version = "\(.*\)"/\1/p' "$manifest")
 zip=$out/steradian-$version.zip
 (cd "$work/addon" && python3 -m zipfile -c "$work/addon.zip" ./*)
 mv "$work/addon.zip" "$zip"

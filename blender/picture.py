@@ -46,7 +46,9 @@ def build():
     for i, material in enumerate(balls):
         scenes.ball(0.55, (1.25 * (i - 1.5), 0.25 * (i % 2), 0.55), material, material.name)
     place = np.random.default_rng(7)
-    pebble = scenes.ball(0.12, (-2.2, -0.8, 0.12), principled("pebble", Base_Color=(0.35, 0.5, 0.2), Roughness=0.4), "pebble")
+    pebble = scenes.ball(
+        0.12, (-2.2, -0.8, 0.12), principled("pebble", Base_Color=(0.35, 0.5, 0.2), Roughness=0.4), "pebble"
+    )
     for i in range(60):
         copy = scenes.link(pebble.data, f"pebble {i}", (place.uniform(-3, 3), place.uniform(0.9, 4), 0.12))
         copy.scale = (place.uniform(0.6, 1.4),) * 3

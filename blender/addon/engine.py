@@ -13,9 +13,8 @@ from .session import Session
 
 def denoiser():
     """The Open Image Denoise that comes with Blender; None where the renderer is to look for one itself."""
-    folders = [Path(bpy.app.binary_path or bpy.__file__).parent / "lib", Path(bpy.utils.resource_path("LOCAL")).parent / "lib"]
-    for folder in folders:
-        found = sorted(folder.glob("libOpenImageDenoise.so*"))
+    for folder in (Path(bpy.app.binary_path or bpy.__file__).parent, Path(bpy.utils.resource_path("LOCAL")).parent):
+        found = sorted(folder.glob("lib/libOpenImageDenoise.so*"))
         if found:
             return str(found[0])
     return None

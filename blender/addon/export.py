@@ -109,7 +109,8 @@ class Export:
         if key not in self._geometries:
             shapes = self._curves(owner) if owner.type == "CURVES" else self._mesh(owner)
             self._geometries[key] = Geometry(shapes, owner.name)
-            hidden = [name for name in ("camera", "diffuse", "glossy", "shadow") if not getattr(owner, f"visible_{name}")]
+            kinds = ("camera", "diffuse", "glossy", "shadow")
+            hidden = [kind for kind in kinds if not getattr(owner, f"visible_{kind}")]
             if hidden:
                 self.report.warn(f"object {owner.name}", f"it is visible to {', '.join(hidden)} rays too")
         return self._geometries[key] if self._geometries[key].shapes else None

@@ -92,7 +92,9 @@ class Fields:
             return Field(values)
         if values[..., 0].size > LARGEST:
             raise Unsupported("the image is too large")
-        return Field(np.broadcast_to(values, textured[0].values.shape).copy(), mapping=textured[0].mapping, uv=textured[0].uv)
+        return Field(
+            np.broadcast_to(values, textured[0].values.shape).copy(), mapping=textured[0].mapping, uv=textured[0].uv
+        )
 
     def socket(self, socket):
         """The field of an input socket. Nodes that have no counterpart give the socket's own value, and a warning."""
@@ -252,7 +254,10 @@ def _math(fields, node, _source):
     inputs = [fields.socket(socket) for socket in node.inputs if socket.enabled]
 
     def computed(*values):
-        numbers = [value[..., :3] @ LUMINANCE if (value[..., :1] != value[..., :3]).any() else value[..., 0] for value in values]
+        numbers = [
+            value[..., :3] @ LUMINANCE if (value[..., :1] != value[..., :3]).any() else value[..., 0]
+            for value in values
+        ]
         if node.operation in singles:
             result = singles[node.operation](numbers[0])
         else:

@@ -17,7 +17,9 @@ def strength(light, report):
         color = [c * t for c, t in zip(color, light.temperature_color)]
     if not uses_nodes(light):
         return color
-    output = next((node for node in light.node_tree.nodes if node.type == "OUTPUT_LIGHT" and node.is_active_output), None)
+    output = next(
+        (node for node in light.node_tree.nodes if node.type == "OUTPUT_LIGHT" and node.is_active_output), None
+    )
     source = origin(output.inputs["Surface"]) if output else None
     emission = source.node if source else None
     if emission is None or emission.type != "EMISSION":

@@ -1,40 +1,16 @@
 """Shader nodes as materials, emission and opacity."""
 
 import math
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
 from .fields import LUMINANCE, Field, Fields, Unsupported, constant, grey, origin, uses_nodes
+from .surface import Look, Surface
 
 # What Blender has where no material is.
 DIFFUSE = {"type": "diffuse", "albedo": 0.8}
 BLACK = {"type": "diffuse", "albedo": 0.0}
-
-
-@dataclass
-class Surface:
-    """What a shader means for a shape.
-
-    material: the name of a material; None scatters nothing. emission: (colour field, factor) or None. opacity: a field,
-    or None for 1. relief: the keys of a relief material, or None.
-    """
-
-    material: Any = None
-    emission: Any = None
-    opacity: Any = None
-    relief: Any = None
-
-
-@dataclass
-class Look:
-    """What shapes of one material have: keys of the shape, and layers of the mesh that textures take."""
-
-    keys: dict = field(default_factory=dict)
-    uv: Any = None
-    color: Any = None
-    needs_uv: bool = False
 
 
 class Materials:
@@ -110,7 +86,12 @@ class _Translation:
 
     def _plain(self, material):
         color = list(material.diffuse_color)[:3]
-        return {"type": "principled", "base_color": color, "roughness": material.roughness, "metallic": material.metallic}
+        return {
+            "type": "principled",
+            "base_color": color,
+            "roughness": material.roughness,
+            "metallic": material.metallic,
+        }
 
     def _finish(self, surface):
         """The material under the material's own name, so that mattes show it."""

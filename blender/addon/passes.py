@@ -30,7 +30,9 @@ def chosen(view_layer):
     if view_layer.use_pass_position:
         found.append(Pass("Position", "XYZ", "VECTOR", "P"))
     names = {name: title for name, title, _ in LAYERS}
-    found += [Pass(f"Steradian {names[name]}", "RGB", "COLOR", name) for name in names if name in view_layer.steradian.layers]
+    found += [
+        Pass(f"Steradian {names[name]}", "RGB", "COLOR", name) for name in names if name in view_layer.steradian.layers
+    ]
     return found
 
 

@@ -32,7 +32,11 @@ class Settings(bpy.types.PropertyGroup):
         precision=4,
     )
     time_limit: bpy.props.FloatProperty(
-        name="Time Limit", description="Seconds after which a render ends; 0: none", default=0.0, min=0.0, subtype="TIME_ABSOLUTE"
+        name="Time Limit",
+        description="Seconds after which a render ends; 0: none",
+        default=0.0,
+        min=0.0,
+        subtype="TIME_ABSOLUTE",
     )
     max_depth: bpy.props.IntProperty(
         name="Max Depth",

@@ -14,8 +14,17 @@ FOLDER = Path(tempfile.mkdtemp(prefix="steradian_test_"))
 
 def reset():
     """An empty scene with a black world, 96 x 72 pixels."""
-    for collection in (bpy.data.objects, bpy.data.meshes, bpy.data.materials, bpy.data.lights, bpy.data.cameras,
-                       bpy.data.images, bpy.data.worlds, bpy.data.curves, bpy.data.hair_curves):
+    for collection in (
+        bpy.data.objects,
+        bpy.data.meshes,
+        bpy.data.materials,
+        bpy.data.lights,
+        bpy.data.cameras,
+        bpy.data.images,
+        bpy.data.worlds,
+        bpy.data.curves,
+        bpy.data.hair_curves,
+    ):
         for block in list(collection):
             collection.remove(block)
     scene = bpy.context.scene
@@ -31,8 +40,14 @@ def reset():
         setattr(scene.cycles, name, 64)
     scene.cycles.blur_glossy = 0
     scene.cycles.sample_clamp_indirect = 0
-    for name in ("use_pass_z", "use_pass_normal", "use_pass_position", "use_pass_cryptomatte_object",
-                 "use_pass_cryptomatte_material", "use_pass_cryptomatte_asset"):
+    for name in (
+        "use_pass_z",
+        "use_pass_normal",
+        "use_pass_position",
+        "use_pass_cryptomatte_object",
+        "use_pass_cryptomatte_material",
+        "use_pass_cryptomatte_asset",
+    ):
         setattr(bpy.context.view_layer, name, False)
     for name in scene.steradian.bl_rna.properties.keys():
         scene.steradian.property_unset(name)
@@ -202,7 +217,9 @@ def spread(steradian, cycles, blocks=4):
     height, width = (side // blocks * blocks for side in steradian.shape[:2])
 
     def means(values):
-        return values[:height, :width, :3].reshape(blocks, height // blocks, blocks, width // blocks, 3).mean(axis=(1, 3))
+        return (
+            values[:height, :width, :3].reshape(blocks, height // blocks, blocks, width // blocks, 3).mean(axis=(1, 3))
+        )
 
     difference = np.abs(means(steradian) - means(cycles)).max() / cycles[..., :3].mean()
     return ratio, difference

@@ -158,8 +158,15 @@ def test_passes_and_mattes_are_in_the_result(tmp_path):
         setattr(layer, f"use_pass_{name}", True)
     layer.steradian.layers = {"albedo", "diffuse_direct"}
     data = multilayer(tmp_path / "all.exr")
-    for name in ("Depth.Z", "Normal.X", "Position.Y", "Steradian Albedo.G", "Steradian Diffuse Direct.R",
-                 "CryptoObject00.R", "CryptoMaterial00.A"):
+    for name in (
+        "Depth.Z",
+        "Normal.X",
+        "Position.Y",
+        "Steradian Albedo.G",
+        "Steradian Diffuse Direct.R",
+        "CryptoObject00.R",
+        "CryptoMaterial00.A",
+    ):
         assert f"{layer.name}.{name}\0".encode() in data or f"{layer.name}.{name.lower()}\0".encode() in data, name
     for text in (b"cryptomatte/", b"MurmurHash3_32", b'"block":"', b'"red":"', f"{layer.name}.CryptoObject".encode()):
         assert text in data, text
