@@ -71,6 +71,7 @@ pub use error::{Error, ErrorKind, Result};
 pub use film::{Crop, DroppedSample, Image, Layer, LayerInfo, LayerSet};
 pub use import::{ImportOptions, ImportReport, Outcome, ReportEntry};
 pub use integrator::RayCounts;
+pub use output::Matte;
 pub use render::{ExrOverrides, Overrides, Progress, Settings, Shard, Stats, TrainedGuide};
 pub use renderer::{
     Assignment, LayerView, PreparedRender, Renderer, Rendering, StateOptions, StopHandle, Watch, changed_settings,

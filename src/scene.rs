@@ -31,6 +31,8 @@ pub struct Surface {
     pub first_light: Option<LightId>,
     /// Whether all primitives are one light: an analytic shape, or two triangles that make up a parallelogram.
     pub single_light: bool,
+    /// Whether it emits and is hidden from the camera.
+    pub hidden: bool,
 }
 
 impl Surface {
@@ -47,6 +49,8 @@ impl Surface {
 pub struct SceneFeatures {
     /// Some shape emits or there is a light.
     pub lights: bool,
+    /// Some shape emits and is hidden from the camera.
+    pub hidden_emitters: bool,
     /// Some light is at infinity and visible to rays that leave the scene.
     pub environment: bool,
     /// Some shape is analytic.

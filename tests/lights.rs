@@ -413,9 +413,9 @@ fn a_hidden_lamp_shows_what_is_behind_it() {
     // lamp, and there is no sky.
     for kind in ["path", "whitted"] {
         for turned in [false, true] {
-            let picture = |hide: bool, near: f64| {
+            let picture_of = |hide: bool, near: f64, hidden: [bool; 2], transparent: bool| {
                 render(&json!({
-                    "film": { "width": 24, "height": 24, "filter": { "type": "box" }, "transparent": near > 0.0 },
+                    "film": { "width": 24, "height": 24, "filter": { "type": "box" }, "transparent": transparent },
                     "camera": { "position": [0, 0, 5], "look_at": [0, 0, 0], "vertical_fov_degrees": 40, "near": near },
                     "sampler": { "spp": 16 },
                     "integrator": { "type": kind, "hide_emitters": hide },
@@ -428,17 +428,18 @@ fn a_hidden_lamp_shows_what_is_behind_it() {
                         {
                             "type": "quad", "origin": [-0.5, -0.5, 1], "edge_u": [1, 0, 0], "edge_v": [0, 1, 0],
                             "reverse_normal": turned,
-                            "emission": { "radiance": [5, 5, 5] }
+                            "emission": { "radiance": [5, 5, 5], "hidden": hidden[0] }
                         },
                         // Another lamp behind it.
                         {
                             "type": "sphere", "radius": 0.1, "transform": [{ "translate": [0, 0, 0.4] }],
-                            "emission": { "radiance": [1, 1, 1] }
+                            "emission": { "radiance": [1, 1, 1], "hidden": hidden[1] }
                         }
                     ],
                     "lights": [{ "type": "environment", "radiance": [0.3, 0.3, 0.3] }]
                 }))
             };
+            let picture = |hide: bool, near: f64| picture_of(hide, near, [false; 2], near > 0.0);
             let (shown, hidden, beyond) = (picture(false, 0.0), picture(true, 0.0), picture(false, 4.8));
             let of = |image: &steradian::internal::film::Image, x: u32, y: u32| {
                 image.pixel(LayerKind::Color, x, y).unwrap().to_vec()
@@ -449,6 +450,12 @@ fn a_hidden_lamp_shows_what_is_behind_it() {
                 [vec![0.3, 0.3, 0.3, 1.0], vec![0.0; 4], vec![0.0; 4]],
                 "{kind}"
             );
+            // Lamps that are hidden one by one.
+            let each = picture_of(false, 0.0, [true; 2], true);
+            assert_eq!(each.layers[0].data, hidden.layers[0].data, "{kind} {turned}");
+            let under_sky = picture_of(false, 0.0, [true, false], false);
+            assert_ne!(of(&under_sky, 12, 12), of(&hidden, 12, 12), "{kind} {turned}: the second lamp is shown");
+            assert_eq!(of(&under_sky, 0, 0), [0.3, 0.3, 0.3, 1.0], "{kind} {turned}");
             let (mut sums, mut covered) = ([0.0; 2], 0);
             for (x, y) in (0..24).flat_map(|y| (0..24).map(move |x| (x, y))) {
                 let (a, b) = (of(&hidden, x, y), of(&beyond, x, y));

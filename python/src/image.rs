@@ -5,12 +5,11 @@ use std::sync::Arc;
 
 use pyo3::exceptions::{PyKeyError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict};
+use pyo3::types::{IntoPyDict, PyBytes, PyDict};
 use serde_json::Value;
-use steradian::Rendering;
 use steradian::desc::{OutputDesc, PixelTypeDesc, ViewDesc};
-use steradian::internal::film::Image;
 use steradian::internal::output::{self, RenderInfo};
+use steradian::{Image, Layer, Rendering};
 use steradian_bench::error::flip;
 
 use crate::convert::{from_json, picture};
@@ -20,7 +19,7 @@ use crate::errors::OrRaise;
 pub enum Source {
     /// A render.
     Rendering(Box<Rendering>),
-    /// A file or an array: the colour alone.
+    /// A file or an array, the colour alone; or a render under way.
     Plain(Image),
 }
 
@@ -29,13 +28,6 @@ impl Source {
         match self {
             Self::Rendering(rendering) => rendering.image(),
             Self::Plain(image) => image,
-        }
-    }
-
-    fn layer_name(&self, index: usize) -> String {
-        match self {
-            Self::Rendering(rendering) => rendering.layers().nth(index).map(|layer| layer.name).unwrap_or_default(),
-            Self::Plain(_) => "color".to_owned(),
         }
     }
 }
@@ -77,7 +69,7 @@ impl PyImage {
     }
 
     fn names(&self) -> Vec<String> {
-        (0..self.source.image().layers.len()).map(|i| self.source.layer_name(i)).collect()
+        self.source.image().layers.iter().map(Layer::name).collect()
     }
 
     fn output(&self, file: String, options: &SaveOptions) -> PyResult<OutputDesc> {
@@ -144,6 +136,26 @@ impl PyImage {
             Source::Rendering(rendering) => from_json(py, &rendering.statistics()),
             Source::Plain(_) => Ok(py.None().into_bound(py)),
         }
+    }
+
+    /// A layer of Cryptomatte that the render had: `channels` (names), `data` (an array of shape (height, width,
+    /// channels) with an id and a coverage for each of `depth` ranks), and `metadata`, which EXR files need beside it.
+    ///
+    /// layer: "crypto_object", "crypto_material" or "crypto_asset". depth: an even number, from 2 to 64.
+    #[pyo3(signature = (layer, *, depth=6))]
+    fn cryptomatte<'py>(&self, py: Python<'py>, layer: &str, depth: u32) -> PyResult<Bound<'py, PyDict>> {
+        let Source::Rendering(rendering) = &*self.source else {
+            return Err(PyKeyError::new_err("only finished renders have Cryptomatte"));
+        };
+        let matte = rendering.cryptomatte(layer, depth).or_raise(py)?;
+        let bytes: Vec<u8> = matte.data.iter().flat_map(|number| number.to_le_bytes()).collect();
+        let data = py.import("numpy")?.call_method1("frombuffer", (PyBytes::new(py, &bytes), "<f4"))?;
+        let found = PyDict::new(py);
+        let shape = (self.height(), self.width(), matte.channels.len());
+        found.set_item("data", data.call_method1("reshape", (shape,))?)?;
+        found.set_item("metadata", matte.metadata().into_py_dict(py)?)?;
+        found.set_item("channels", matte.channels)?;
+        Ok(found)
     }
 
     fn __getitem__<'py>(&self, py: Python<'py>, layer: &str) -> PyResult<Bound<'py, PyAny>> {

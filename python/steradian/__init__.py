@@ -56,11 +56,21 @@ __all__ = [
 ]
 
 
-def render(scene: Scene, *, progress: bool | Callable[[float], Any] = False, **settings: Any) -> Image:
+def render(
+    scene: Scene,
+    *,
+    progress: bool | Callable[[float], Any] = False,
+    picture: Callable[[Image, int], Any] | None = None,
+    picture_every: float = 1.0,
+    **settings: Any,
+) -> Image:
     """Render a scene. Other threads run meanwhile; Ctrl-C ends the render with KeyboardInterrupt.
 
-    progress: True shows a bar, in terminals and notebooks; a function is called with the share done, from 0 to 1. An
-    exception in it ends the render.
+    progress: True shows a bar, in terminals and notebooks; a function is called with the share done, from 0 to 1. If it
+    returns False the render ends, and the result is the picture of the samples so far; an exception ends the render too.
+
+    picture: a function that is called with the picture so far and its samples per pixel, at most every `picture_every`
+    seconds, in the thread that called `render`.
 
     Settings replace those of the scene for this render. They have the names of the options of `steradian render`:
     spp, size=(width, height), crop=(x, y, width, height), seed, threads, integrator="path", max_depth,
@@ -69,8 +79,8 @@ def render(scene: Scene, *, progress: bool | Callable[[float], Any] = False, **s
     """
     if progress is True:
         with _progress.Bar() as bar:
-            return _render(scene, progress=bar, **settings)
-    return _render(scene, progress=progress or None, **settings)
+            return _render(scene, progress=bar, picture=picture, picture_every=picture_every, **settings)
+    return _render(scene, progress=progress or None, picture=picture, picture_every=picture_every, **settings)
 
 
 def bench(scene: Scene, *, seconds: float = 2.0, **settings: Any) -> dict[str, Any]:

@@ -49,6 +49,8 @@ class Image:
         """Time, rays, samples and memory of the render; None of a picture that was read."""
     def channels(self, layer: str) -> list[str]:
         """Names of a layer's channels."""
+    def cryptomatte(self, layer: str, *, depth: int = 6) -> dict[str, Any]:
+        """A layer of Cryptomatte: "channels" (names), "data" (an array) and "metadata" (attributes for EXR files)."""
     def save(
         self, file: str | PathLike[str], *, exposure: float = 0.0, view: str | None = None, float: bool = False
     ) -> None:
@@ -69,7 +71,14 @@ def load(
     **settings: Any,
 ) -> Scene: ...
 def load_dict(scene: dict[str, Any], *, folder: str | PathLike[str] | None = None, **settings: Any) -> Scene: ...
-def render(scene: Scene, *, progress: Callable[[float], Any] | None = None, **settings: Any) -> Image: ...
+def render(
+    scene: Scene,
+    *,
+    progress: Callable[[float], Any] | None = None,
+    picture: Callable[[Image, int], Any] | None = None,
+    picture_every: float = 1.0,
+    **settings: Any,
+) -> Image: ...
 def read(file: str | PathLike[str]) -> Image: ...
 def write(
     file: str | PathLike[str],

@@ -1,6 +1,7 @@
 """Tests of the installed package: `python/test.sh` builds the wheel and runs them in a new environment."""
 
 import gc
+import json
 import os
 import signal
 import threading
@@ -197,6 +198,55 @@ def test_progress_is_reported_and_ends_at_one():
     with pytest.raises(RuntimeError, match="enough"):
         st.render(scene, progress=fail)
     assert st.render(scene, spp=1, progress=True).statistics["spp"] == 1
+
+
+def test_false_ends_a_render_with_the_picture_so_far():
+    scene = st.load_dict(ball(), spp=1 << 24)
+    image = st.render(scene, progress=lambda share: share == 0)
+    assert image.statistics["interrupted"] and 0 < image.statistics["spp"] < 1 << 24
+    assert st.render(scene, spp=1, progress=lambda share: None).statistics["spp"] == 1
+
+
+def test_pictures_on_the_way_are_handed_over():
+    scene, found = st.load_dict(ball(), spp=1 << 24, layers=["N"]), []
+    image = st.render(
+        scene, picture=lambda image, samples: found.append((image, samples)), picture_every=0,
+        progress=lambda share: len(found) < 3,
+    )
+    samples = [count for _, count in found]
+    assert len(found) >= 3 and samples == sorted(samples) and samples[0] > 0
+    for partial, _ in found:
+        assert partial.layers == ["color", "N"] and partial.statistics is None
+        assert partial["color"].mean() == pytest.approx(image["color"].mean(), rel=0.05)
+    with pytest.raises(st.SettingError, match="picture_every"):
+        st.render(scene, picture=print, picture_every=-1)
+
+
+def test_cryptomatte_is_an_array_with_its_names():
+    scene = st.load_dict(ball(), spp=4)
+    matte = st.render(scene, layers=["crypto_material"]).cryptomatte("crypto_material", depth=4)
+    assert matte["channels"][:5] == [f"CryptoMaterial00.{c}" for c in "rgba"] + ["CryptoMaterial01.r"]
+    assert matte["data"].shape == (32, 48, 8)
+    names = json.loads(next(text for key, text in matte["metadata"].items() if key.endswith("/manifest")))
+    red = np.array([int(names["red"], 16)], np.uint32).view(np.float32)[0]
+    assert matte["data"][16, 24, 0] == red and matte["data"][16, 24, 1] == 1
+    assert {key.split("/")[2] for key in matte["metadata"]} == {"name", "hash", "conversion", "manifest"}
+    image = st.render(scene, spp=1)
+    for layer, depth, message in (("crypto_object", 6, "no Cryptomatte"), ("N", 6, "no Cryptomatte"), ("crypto_object", 3, "even")):
+        with pytest.raises(st.SteradianError, match=message):
+            image.cryptomatte(layer, depth=depth)
+
+
+def test_a_hidden_lamp_is_seen_in_mirrors_alone():
+    lamp = {"type": "sphere", "radius": 0.3, "transform": {"translate": [0, 0, 3]}, "emission": {"radiance": 9}}
+    wall = {"type": "quad", "origin": [-5, -5, 0], "edge_u": [10, 0, 0], "edge_v": [0, 10, 0], "material": "mirror"}
+    camera = {"position": [0, 0, 6], "look_at": [0, 0, 0]}
+    scene = st.load_dict(ball(camera=camera, materials={"mirror": {"type": "mirror"}}, shapes=[lamp, wall], lights=[]), spp=1)
+    assert st.render(scene)["color"][16, 24, 0] == pytest.approx(9, rel=1e-5)
+    scene["shapes[0].emission.hidden"] = True
+    # The mirror shows it at the same place, farther away.
+    hidden = st.render(scene)["color"][..., 0]
+    assert hidden[16, 24] > 7 and (hidden > 0).sum() < hidden.size / 20
 
 
 def test_other_threads_run_during_a_render():

@@ -267,6 +267,7 @@ impl Builder {
         let smooth = |shape: &Shape| matches!(shape, Shape::Mesh(mesh) if mesh.has_normals());
         let features = SceneFeatures {
             lights: !lights.is_empty(),
+            hidden_emitters: self.surfaces.iter().any(|surface| surface.hidden),
             environment: sky,
             analytic_shapes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Analytic(_))),
             instances: !self.geometry.instances.is_empty(),

@@ -49,6 +49,8 @@ const SMALLEST_MESH: f64 = 1.0 / (1u64 << 40) as f64;
 pub struct PreparedEmission {
     /// The light.
     pub emission: Emission,
+    /// Whether the shape is hidden from the camera.
+    pub hidden: bool,
     group: Option<LightGroupId>,
 }
 
@@ -187,7 +189,11 @@ impl Builder {
                 // The shape's own keys override the MTL.
                 let given = if desc.opacity.is_some() { binding.opacity } else { from_mtl.binding.opacity };
                 binding = MaterialBinding { opacity: given, ..from_mtl.binding };
-                emission = emission.or(from_mtl.emission.map(|emission| PreparedEmission { emission, group: None }));
+                emission = emission.or(from_mtl.emission.map(|emission| PreparedEmission {
+                    emission,
+                    group: None,
+                    hidden: false,
+                }));
             }
             if !has_uvs && self.materials.needs_uv(&binding) {
                 return Err(meshes::refusal(
@@ -279,7 +285,7 @@ impl Builder {
         let brightest = texture.map_or(1.0, |id| self.materials.textures.get(id).range()[1]);
         self.files.emitted(&format!("{path}.radiance"), (radiance * brightest).to_array())?;
         let emission = Emission { radiance, two_sided: desc.two_sided, texture, opacity: None };
-        Ok((!radiance.is_black()).then_some(PreparedEmission { emission, group }))
+        Ok((!radiance.is_black()).then_some(PreparedEmission { emission, group, hidden: desc.hidden }))
     }
 
     /// Rejects a placed shape that is too large or too small for `f32`.
@@ -364,12 +370,14 @@ impl Builder {
                 .error(&path, "the surface of a medium cannot emit light: it may turn out to be no boundary"));
         }
         let (material, normal_perturbation) = (binding.material, binding.normal_perturbation);
-        let mut surface = Surface { material, normal_perturbation, medium, first_light: None, single_light: false };
-        if let Some(PreparedEmission { emission, group }) = emission {
+        let mut surface =
+            Surface { material, normal_perturbation, medium, first_light: None, single_light: false, hidden: false };
+        if let Some(PreparedEmission { emission, group, hidden }) = emission {
             let emission = Emission { opacity: binding.opacity, ..emission };
             let lights = AreaLight::for_shape(id, emission, &self.geometry, &self.materials.textures.textures);
             if lights.iter().any(|light| light.area() > 0.0) {
                 surface.single_light = lights.len() == 1;
+                surface.hidden = hidden;
                 surface.first_light = Some(self.lights.add(lights.into_iter().map(Light::Area), group));
             } else {
                 self.files.warn(&format!("{path}.emission"), format_args!("the shape is too small to emit light"));

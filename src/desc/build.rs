@@ -120,7 +120,8 @@ impl ShapeDesc {
     /// The shape emits this radiance, linear RGB, from its front.
     #[must_use]
     pub fn emitting(mut self, radiance: [f32; 3]) -> Self {
-        *self.common_mut().emission = Some(EmissionDesc { radiance, texture: None, two_sided: false, group: None });
+        *self.common_mut().emission =
+            Some(EmissionDesc { radiance, texture: None, two_sided: false, hidden: false, group: None });
         self
     }
 }

@@ -38,6 +38,30 @@ impl LightDesc {
     }
 }
 
+/// Light emitted by a shape.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EmissionDesc {
+    /// Radiance, linear RGB.
+    #[serde(deserialize_with = "spread")]
+    #[schemars(with = "Spread<3>")]
+    pub radiance: [f32; 3],
+    /// A texture by name whose colour multiplies the radiance. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub texture: Option<String>,
+    /// Whether both sides emit; otherwise only the front does.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub two_sided: bool,
+    /// Whether the shape, with both its sides, is hidden from the camera, whose rays pass through it; mirror images of
+    /// it and what is seen through glass stay. Default: false.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub hidden: bool,
+    /// The light group, by name (letters, digits and underscores): the contribution of each group can be stored as an
+    /// AOV. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub group: Option<String>,
+}
+
 /// A point light: the irradiance at distance d is `intensity / d²`.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -29,8 +29,8 @@ pub use curves::{CurveBasisDesc, CurveKindDesc};
 pub use files::NamedFile;
 pub use hair::{HairDesc, HairIor, HairRoughness, HairTilt};
 pub use light::{
-    DirectionalLightDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, PointLightDesc, ProjectorLightDesc,
-    SpotLightDesc,
+    DirectionalLightDesc, EmissionDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, PointLightDesc,
+    ProjectorLightDesc, SpotLightDesc,
 };
 pub use material::{
     ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, PlasticDesc, RangedDesc, RoughnessDesc,
@@ -47,9 +47,9 @@ pub use settings::{
     MAX_SIDE, RouletteDesc, SamplerDesc, SamplerKindDesc, StrategyDesc,
 };
 pub use shape::{
-    ConeDesc, CubeDesc, CurvesDesc, CylinderDesc, DiskDesc, EmissionDesc, InstanceDesc, MeshDesc, ObjectDesc,
-    OpacityDesc, PlaneDesc, PointsDesc, ProfileDesc, ProfileParameterDesc, QuadDesc, RevolutionDesc, ShapeCommon,
-    ShapeCommonMut, ShapeDesc, SphereDesc,
+    ConeDesc, CubeDesc, CurvesDesc, CylinderDesc, DiskDesc, InstanceDesc, MeshDesc, ObjectDesc, OpacityDesc, PlaneDesc,
+    PointsDesc, ProfileDesc, ProfileParameterDesc, QuadDesc, RevolutionDesc, ShapeCommon, ShapeCommonMut, ShapeDesc,
+    SphereDesc,
 };
 pub use texture::{ChannelDesc, ColorSpaceDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
 pub use transform::{KeyframeDesc, ScaleDesc, TransformDesc, TransformStepDesc};

@@ -6,9 +6,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::curves::{CurveBasisDesc, CurveKindDesc, radius_scale};
-use super::lists::{OneOrMore, Spread, one_or_more, spread};
+use super::lists::{OneOrMore, one_or_more};
 use super::mesh::{AttributeDesc, MeshShadingDesc, NormalWeightDesc, SmoothByDesc};
-use super::{KeyframeDesc, TransformDesc};
+use super::{EmissionDesc, KeyframeDesc, TransformDesc};
 
 /// Declares the shapes: a struct for each, the fields that all share, and the enum over them.
 macro_rules! shapes {
@@ -443,26 +443,6 @@ pub enum OpacityDesc {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         threshold: Option<f32>,
     },
-}
-
-/// Light emitted by a shape.
-#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct EmissionDesc {
-    /// Radiance, linear RGB.
-    #[serde(deserialize_with = "spread")]
-    #[schemars(with = "Spread<3>")]
-    pub radiance: [f32; 3],
-    /// A texture by name whose colour multiplies the radiance. Default: none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub texture: Option<String>,
-    /// Whether both sides emit; otherwise only the front does.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub two_sided: bool,
-    /// The light group, by name (letters, digits and underscores): the contribution of each group can be stored as an
-    /// AOV. Default: none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub group: Option<String>,
 }
 
 /// A group of shapes, and instances of other objects.

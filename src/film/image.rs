@@ -97,6 +97,14 @@ impl Layer {
         Self { kind, group: None, data }
     }
 
+    /// The layer's name, such as `color`, `N` or `light_key`.
+    pub fn name(&self) -> String {
+        match &self.group {
+            Some(group) => format!("light_{group}"),
+            None => LayerInfo::of(self.kind).name.to_owned(),
+        }
+    }
+
     /// The channels' full names in a file.
     pub fn channel_names(&self) -> Vec<String> {
         let prefix = self.group.as_ref().map(|group| format!("light_{group}.")).unwrap_or_default();

@@ -50,9 +50,9 @@ impl Integrator for Whitted {
             let in_media = world.scene.features.media;
             let current = if in_media { world.media_at_start(&sample.ray) } else { MediumStack::default() };
             let mut ray = sample.ray;
-            if self.hide_emitters {
+            if world.skips_emitters(self.hide_emitters) {
                 let hit = world.accel.intersect(&ray);
-                counts.camera += 1 + world.skip_emitters(&mut ray, hit).1;
+                counts.camera += 1 + world.skip_emitters(&mut ray, hit, self.hide_emitters).1;
             }
             let segment = Segment::trace(world, ray, pass.render.camera_cone(&ray), current, counts);
             if needs_surface {

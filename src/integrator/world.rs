@@ -111,10 +111,18 @@ impl<'a> World<'a> {
         at
     }
 
-    /// Lets `ray`, which has found `hit`, start behind the emitters that it meets first. The result is its new hit and
-    /// the number of rays traced.
-    pub(super) fn skip_emitters(&self, ray: &mut Ray, mut hit: Option<Hit>) -> (Option<Hit>, u64) {
-        let emits = |at: &SurfaceInteraction| self.scene.surface(at.shape).light(at.prim).is_some();
+    /// Whether camera rays pass through emitters: through those that are hidden, or through all.
+    pub(super) fn skips_emitters(&self, all: bool) -> bool {
+        all || self.scene.features.hidden_emitters
+    }
+
+    /// Lets `ray`, which has found `hit`, start behind the hidden emitters, or all, that it meets first. The result is
+    /// its new hit and the number of rays traced.
+    pub(super) fn skip_emitters(&self, ray: &mut Ray, mut hit: Option<Hit>, all: bool) -> (Option<Hit>, u64) {
+        let emits = |at: &SurfaceInteraction| {
+            let surface = self.scene.surface(at.shape);
+            surface.hidden || (all && surface.light(at.prim).is_some())
+        };
         for passed in 0..MAX_EMITTERS {
             let Some(at) = self.resolve(ray, hit).filter(emits) else {
                 return (hit, passed);

@@ -11,6 +11,7 @@ mod read;
 mod write;
 
 pub use blocks::write_image;
+pub use coverage::{Matte, matte};
 pub use metadata::sidecar_path;
 pub use plan::{OutputFault, check_output, find_output_fault};
 pub use read::{read_exr, read_settings};

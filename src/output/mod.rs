@@ -11,7 +11,9 @@ mod role;
 mod uses;
 mod view;
 
-pub use self::exr::{OutputFault, check_output, find_output_fault, read_exr, read_settings, write_exr, write_image};
+pub use self::exr::{
+    Matte, OutputFault, check_output, find_output_fault, matte, read_exr, read_settings, write_exr, write_image,
+};
 pub use check::{Finding, RULES, Rule, Severity, check_exr};
 pub use compare::{Comparison, RELATIVE_FLOOR, compare};
 pub use png::write_png;

@@ -6,10 +6,12 @@ use serde_json::{Value, json};
 
 use crate::denoise::Report;
 use crate::desc::OutputDesc;
-use crate::error::Result;
-use crate::film::{Image, Layer, LayerInfo};
-use crate::output::{self, Format, RenderInfo};
+use crate::error::{Error, Result};
+use crate::film::{Image, Layer};
+use crate::output::{self, Format, Matte, RenderInfo};
 use crate::render::{Settings, Stats};
+
+use super::layers_of;
 
 /// A picture with its layers and all that its files hold.
 #[derive(Clone, Debug)]
@@ -54,11 +56,7 @@ pub struct LayerView<'a> {
 
 impl<'a> LayerView<'a> {
     fn new(layer: &'a Layer) -> Self {
-        let name = match &layer.group {
-            Some(group) => format!("light_{group}"),
-            None => LayerInfo::of(layer.kind).name.to_owned(),
-        };
-        Self { name, channels: layer.channel_names(), data: &layer.data }
+        Self { name: layer.name(), channels: layer.channel_names(), data: &layer.data }
     }
 
     /// The pixels in order, each as a slice of its channels.
@@ -123,6 +121,22 @@ impl Rendering {
     /// The layer of this name.
     pub fn layer(&self, name: &str) -> Option<LayerView<'_>> {
         self.layers().find(|layer| layer.name == name)
+    }
+
+    /// A layer of Cryptomatte with `depth` ranks, an even number, by its name, such as `crypto_object`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`](crate::Error::Usage) for another layer, one that was not rendered, or another depth.
+    pub fn cryptomatte(&self, layer: &str, depth: u32) -> Result<Matte> {
+        let output = OutputDesc { crypto_depth: Some(depth), ..OutputDesc::new("") };
+        output::check_output(&output)?;
+        let covered = self.image.coverage.as_ref().zip(self.info.identities.as_ref());
+        let kinds = layers_of(layer)?;
+        let requested = kinds.iter().find(|kind| self.settings.stored_layers().contains(kind));
+        requested
+            .zip(covered)
+            .and_then(|(kind, (coverage, identities))| output::matte(*kind, coverage, identities, depth as usize))
+            .ok_or_else(|| Error::Usage(format!("the picture has no Cryptomatte {layer:?} among its layers")))
     }
 
     /// Writes the picture to an `.exr` file with all layers and metadata, or to a `.png` file. It is written like the

@@ -16,10 +16,10 @@ pub(super) fn closest(context: &Context, wave: &mut Wave, counts: &mut RayCounts
         let count = wave.block_len(block);
         let (rays, hits) = (&mut wave.rays[block], &mut wave.hits[block]);
         context.world.accel.intersect_rows(rays, count, hits, coherence);
-        if is_camera && context.config.hide_emitters {
+        if is_camera && context.world.skips_emitters(context.config.hide_emitters) {
             for lane in 0..count {
                 let mut ray = rays.get(lane);
-                let (hit, traced) = context.world.skip_emitters(&mut ray, hits.get(lane));
+                let (hit, traced) = context.world.skip_emitters(&mut ray, hits.get(lane), context.config.hide_emitters);
                 counts.camera += traced;
                 rays.set(lane, &ray);
                 hits.set(lane, hit);

@@ -23,6 +23,26 @@ pub struct Matte {
     pub manifest: String,
 }
 
+impl Matte {
+    /// The attributes of a file that describe the matte, with the names in it.
+    pub fn metadata(&self) -> Vec<(String, String)> {
+        let mut attributes = self.description();
+        attributes.push(self.attribute("manifest", &self.manifest));
+        attributes
+    }
+
+    /// [`metadata`](Self::metadata) without the names.
+    pub fn description(&self) -> Vec<(String, String)> {
+        let words = [("name", self.name), ("hash", cryptomatte::HASH), ("conversion", cryptomatte::CONVERSION)];
+        words.map(|(word, value)| self.attribute(word, value)).to_vec()
+    }
+
+    /// One attribute.
+    pub fn attribute(&self, word: &str, value: &str) -> (String, String) {
+        (format!("cryptomatte/{}/{word}", cryptomatte::metadata_key(self.name)), value.to_owned())
+    }
+}
+
 /// The Cryptomatte of a layer with `depth` ranks; `None` for other layers.
 pub fn matte(kind: LayerKind, coverage: &Coverage, identities: &Identities, depth: usize) -> Option<Matte> {
     let name = type_name(kind)?;

@@ -11,7 +11,6 @@ use super::plan::PartKind;
 use crate::desc::{CryptoManifestDesc, OutputDesc};
 use crate::output::RenderInfo;
 use crate::output::color_space::{DATA, INTEROP_ID, SCENE_LINEAR};
-use crate::output::cryptomatte;
 
 /// The attribute with the settings of a render.
 pub const SETTINGS: &str = "steradian/settings";
@@ -51,16 +50,15 @@ impl Mattes<'_> {
 
     fn describe(&self, attributes: &mut LayerAttributes) {
         for matte in self.mattes {
-            let key = cryptomatte::metadata_key(matte.name);
-            let mut entry = |word: &str, value: &str| {
-                put(attributes, &format!("cryptomatte/{key}/{word}"), AttributeValue::Text(text(value)));
+            let entries = match self.manifest {
+                CryptoManifestDesc::Embedded => matte.metadata(),
+                CryptoManifestDesc::Sidecar => {
+                    let names = matte.attribute("manif_file", &self.sidecar(matte));
+                    matte.description().into_iter().chain([names]).collect()
+                }
             };
-            entry("name", matte.name);
-            entry("hash", cryptomatte::HASH);
-            entry("conversion", cryptomatte::CONVERSION);
-            match self.manifest {
-                CryptoManifestDesc::Embedded => entry("manifest", &matte.manifest),
-                CryptoManifestDesc::Sidecar => entry("manif_file", &self.sidecar(matte)),
+            for (name, value) in entries {
+                put(attributes, &name, AttributeValue::Text(text(&value)));
             }
         }
     }

@@ -77,12 +77,19 @@ impl<'a> Reader<'a> {
         let emission = match texture.map(|id| self.texture(id, Role::Color, uv)).transpose()? {
             Some(TextureValue::Named(texture)) => {
                 element.take("radiance");
-                EmissionDesc { radiance: [1.0; 3], texture: Some(texture), two_sided: false, group: None }
+                EmissionDesc {
+                    radiance: [1.0; 3],
+                    texture: Some(texture),
+                    two_sided: false,
+                    hidden: false,
+                    group: None,
+                }
             }
             _ => EmissionDesc {
                 radiance: self.emitted(&mut element, "radiance")?,
                 texture: None,
                 two_sided: false,
+                hidden: false,
                 group: None,
             },
         };

@@ -82,6 +82,6 @@ impl AreaLight {
         let radiance = self.radiance.map(|x| (f64::from(x) * factor) as f32);
         let shines = radiance.iter().any(|&x| x > 0.0);
         let texture = self.texture.clone();
-        shines.then_some(EmissionDesc { radiance, texture, two_sided: self.two_sided, group: None })
+        shines.then_some(EmissionDesc { radiance, texture, two_sided: self.two_sided, hidden: false, group: None })
     }
 }

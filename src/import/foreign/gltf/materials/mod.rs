@@ -293,7 +293,7 @@ impl<'a> Builder<'a, '_> {
             Some(texture) => self.inputs.image(self.source, self.draft, texture, None)?,
             None => None,
         };
-        Ok(Some(EmissionDesc { radiance, texture, two_sided: self.json.double_sided, group: None }))
+        Ok(Some(EmissionDesc { radiance, texture, two_sided: self.json.double_sided, hidden: false, group: None }))
     }
 
     /// The material with its normal map, by name.
