@@ -48,10 +48,10 @@ def adjust(chapter):
 
 def document(file):
     text = file.read_text()
-    title = re.search(r"^# (.*)$", text, re.M)
+    title = "Checks of numerical stability" if file.stem == "stability" else re.search(r"^# (.*)$", text, re.M)[1]
     path = file.relative_to(ROOT).as_posix()
     return {"Chapter": {
-        "name": title[1] if title else file.stem, "content": text, "number": None, "sub_items": [], "path": path,
+        "name": title, "content": text, "number": None, "sub_items": [], "path": path,
         "source_path": path, "parent_names": [],
     }}
 
