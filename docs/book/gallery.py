@@ -3,6 +3,7 @@
 
     docs/book/gallery.py                    all pictures, into docs/book/src/pictures
     docs/book/gallery.py pool chess         these only
+    docs/book/gallery.py --spp 256 pool     with more samples than the scene has
     docs/book/gallery.py --draft DIR pool   small and noisy, into DIR
     docs/book/gallery.py --write DIR pool   the scene file with its meshes and images in DIR/pool, without rendering
 
@@ -58,6 +59,7 @@ def save(png, jpg):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(SCENES))
+    parser.add_argument("--spp", metavar="N")
     parser.add_argument("--draft", type=Path, metavar="DIR")
     parser.add_argument("--write", type=Path, metavar="DIR")
     args = parser.parse_args()
@@ -72,7 +74,7 @@ def main():
                 args.draft.mkdir(parents=True, exist_ok=True)
                 Image.open(png).save(args.draft / f"{name}.png")
             else:
-                render(scene, png)
+                render(scene, png, *(["--spp", args.spp] if args.spp else []))
                 save(png, PICTURES / f"gallery_{name}.jpg")
         print(name)
 

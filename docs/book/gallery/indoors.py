@@ -77,7 +77,7 @@ def chess(folder):
         "camera": {"position": [1.9, 1.9, 7.4], "look_at": [0.25, 0.86, -0.3], "vertical_fov_degrees": 27,
                    "lens": {"radius": 0.11, "focus_point": [0.5, 1.2, 2.45], "blades": {"count": 6, "rotation_degrees": 12}}},
         "integrator": {"type": "path", "max_depth": 12},
-        "sampler": {"spp": 32},
+        "sampler": {"spp": 20},
         "textures": {"light": wood("light.png"), "dark": wood("dark.png"), "table": {"type": "image", "file": "table.png", "scale": [3, 2]},
                      "board": {"type": "image", "file": "light.png", "scale": [0.5, 0.8]}, "board2": {"type": "image", "file": "dark.png", "scale": [0.5, 0.8]}},
         "materials": LAMP | {
@@ -137,7 +137,7 @@ def jewels(folder):
         "film": {"width": 1280, "height": 800},
         "camera": {"position": [0.3, 2.7, 8.3], "look_at": [0.05, 1.12, 0.2], "vertical_fov_degrees": 24, "lens": {"radius": 0.05, "focus_point": [-0.1, 1.9, 0.4]}},
         "integrator": {"type": "path", "max_depth": 40, "rr_depth": 20, "clamp": 12},
-        "sampler": {"spp": 32},
+        "sampler": {"spp": 20},
         "materials": LAMP | {
             "silk": {"type": "principled", "base_color": [0.035, 0.03, 0.06], "roughness": 0.38, "sheen": 0.6, "specular": 0.5},
             "gold": {"type": "conductor", "metal": "gold", "roughness": 0.09},
@@ -192,7 +192,7 @@ def flacon(folder):
         "film": {"width": 1280, "height": 1024},
         "camera": {"position": [0, 2.05, 9.2], "look_at": [0, 1.78, 0], "vertical_fov_degrees": 23, "lens": {"radius": 0.09, "focus_point": [0, 1.7, 0.35]}},
         "integrator": {"type": "path", "max_depth": 32, "rr_depth": 16, "clamp": 10},
-        "sampler": {"spp": 24},
+        "sampler": {"spp": 16},
         "textures": {"marble": {"type": "image", "file": "marble.png", "scale": [0.45, 0.45]}, "label": {"type": "image", "file": "label.png", "filter": "bilinear"}},
         "materials": LAMP | {
             "paper": {"type": "diffuse", "albedo": [0.62, 0.40, 0.35]},
@@ -244,7 +244,7 @@ def cradle(folder):
         "film": {"width": 1280, "height": 720},
         "camera": {"position": [-2.2, 2.2, 8.2], "look_at": [0.42, 1.42, 0], "vertical_fov_degrees": 26, "lens": {"radius": 0.05, "focus_point": [0, 1.0, 0.3]}},
         "integrator": {"type": "path", "max_depth": 16},
-        "sampler": {"spp": 32},
+        "sampler": {"spp": 24},
         "textures": {"wood": {"type": "image", "file": "wood.png", "scale": [0.35, 0.35]}},
         "materials": LAMP | {
             "wall": {"type": "plastic", "albedo": [0.05, 0.17, 0.19], "roughness": 0.55},
@@ -317,7 +317,7 @@ def drinks(folder):
         "film": {"width": 1280, "height": 720},
         "camera": {"position": [0.42, 1.35, 8.4], "look_at": [0.42, 1.06, 0], "vertical_fov_degrees": 22.5, "lens": {"radius": 0.04, "focus_point": [0, 1, 0.4]}},
         "integrator": {"type": "path", "max_depth": 48, "rr_depth": 16, "clamp": 8},
-        "sampler": {"spp": 20},
+        "sampler": {"spp": 12},
         "textures": {"orange": {"type": "image", "file": "orange.png", "filter": "bilinear"}, "slice": {"type": "image", "file": "slice.png", "filter": "bilinear"}, "field": {"type": "image", "file": "field.png", "color_space": "linear"}},
         "materials": LAMP | {
             "table": {"type": "plastic", "albedo": [0.035, 0.025, 0.022], "roughness": 0.12},
@@ -385,7 +385,7 @@ def fluffy(folder):
         "film": {"width": 1280, "height": 720},
         "camera": {"position": [0.15, 1.55, 8.4], "look_at": [0.15, 1.02, 0], "vertical_fov_degrees": 23, "lens": {"radius": 0.06, "focus_point": [-0.3, 1.2, 0.8]}},
         "integrator": {"type": "path", "max_depth": 12},
-        "sampler": {"spp": 8},
+        "sampler": {"spp": 4},
         "materials": LAMP | {
             "floor": {"type": "diffuse", "albedo": [0.80, 0.62, 0.30]},
             "teal": {"type": "hair", "color": [0.05, 0.42, 0.46], "azimuthal_roughness": 0.35, "longitudinal_roughness": 0.35}, "peach": {"type": "hair", "color": [0.88, 0.40, 0.30], "azimuthal_roughness": 0.35, "longitudinal_roughness": 0.35},
@@ -420,7 +420,7 @@ def attractor(_):
         "film": {"width": 1280, "height": 720},
         "camera": {"position": [0.5, 2.6, 9.2], "look_at": [0, 1.95, 0], "vertical_fov_degrees": 29, "lens": {"radius": 0.05, "focus_distance": 8.9}},
         "integrator": {"type": "path", "max_depth": 12},
-        "sampler": {"spp": 32},
+        "sampler": {"spp": 20},
         "materials": LAMP | {
             "floor": {"type": "plastic", "albedo": [0.012, 0.014, 0.02], "roughness": 0.28}, "plinth": {"type": "plastic", "albedo": [0.02, 0.02, 0.024], "roughness": 0.2},
             "gold": {"type": "conductor", "metal": "gold", "roughness": 0.22},
