@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
-"""Draws the diagrams of src/accelerators_study.md: the same shapes and the same ray in a list, an octree, a kd-tree and two hierarchies of boxes."""
+"""Draws the diagrams of src/accelerators_study.md: the same shapes and the same ray in a list, an octree, a kd-tree and two hierarchies of boxes; and a
+plot of the page's table of growth."""
 
+import math
 import random
 from pathlib import Path
 
@@ -106,8 +108,37 @@ def draw(name, boxes, tested, nodes):
     (FOLDER / f"{name}.svg").write_text("\n".join(parts) + "\n")
 
 
+def growth():
+    """The table of the page as a plot with logarithmic axes."""
+    lines = (FOLDER.parent / "accelerators_study.md").read_text().splitlines()
+    start = next(i for i, line in enumerate(lines) if line.startswith("| triangles |"))
+    cells = [[cell.strip(" `").replace(",", "") for cell in line.strip("|").split("|")] for line in lines[start:] if line.startswith("|")]
+    names, rows = cells[0][1:], [[float(cell) for cell in row] for row in cells[2:] if row[0].isdigit()]
+    left, top, width, height = 64, 14, 420, 300
+    x = lambda n: left + (math.log10(n) - 2) / 3 * width
+    y = lambda ns: top + height - (math.log10(ns) - 2) / 6 * height
+    parts = ['<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 580 360" width="580" font-family="sans-serif" font-size="13">', '<rect width="100%" height="100%" fill="#fff"/>']
+    for k in range(2, 9):
+        label = {2: "100 ns", 3: "1 µs", 4: "10 µs", 5: "0.1 ms", 6: "1 ms", 7: "10 ms", 8: "0.1 s"}[k]
+        parts.append(f'<path d="M{left} {y(10 ** k):.1f}h{width}" stroke="#ddd"/><text x="{left - 6}" y="{y(10 ** k) + 4:.1f}" text-anchor="end">{label}</text>')
+    for row in rows:
+        parts.append(f'<text x="{x(row[0]):.1f}" y="{top + height + 20}" text-anchor="middle">{row[0]:,.0f}</text>')
+    parts.append(f'<text x="{left + width / 2}" y="{top + height + 40}" text-anchor="middle">triangles</text>')
+    # Labels at the ends of lines keep a distance from each other.
+    ends, last = {}, -100.0
+    for i in sorted(range(len(names)), key=lambda i: y(rows[-1][i + 1])):
+        last = max(y(rows[-1][i + 1]) + 4, last + 14)
+        ends[i] = last
+    for i, name in enumerate(names):
+        points = " ".join(f"{x(row[0]):.1f},{y(row[i + 1]):.1f}" for row in rows)
+        color = ["#d4483b", "#c0872b", "#8a4f9e", "#3a8f5c", "#1f6f8b"][i]
+        parts.append(f'<polyline points="{points}" fill="none" stroke="{color}" stroke-width="2"/><text x="{left + width + 8}" y="{ends[i]:.1f}" fill="{color}">{name}</text>')
+    (FOLDER / "growth.svg").write_text("\n".join(parts) + "\n</svg>\n")
+
+
 def main():
     FOLDER.mkdir(exist_ok=True)
+    growth()
     world = (0, 0, SIZE, SIZE)
     draw("linear", [], SHAPES, 0)
     for name, cells in [("octree", octree(world, SHAPES)), ("kdtree", kdtree(world, SHAPES))]:
