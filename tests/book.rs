@@ -133,7 +133,7 @@ fn the_gallery_shows_every_picture_of_its_scripts() {
     let book = root().join("docs/book");
     let page = fs::read_to_string(book.join("src/gallery.md")).unwrap();
     let mut count = 0;
-    for script in ["indoors", "outdoors"] {
+    for script in ["glass", "indoors", "outdoors", "studio"] {
         let text = fs::read_to_string(book.join(format!("gallery/{script}.py"))).unwrap();
         let list = text.rsplit("SCENES = [").next().unwrap().trim_end().trim_end_matches(']');
         for name in list.split(", ") {

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks the links of a built book: files and anchors inside it exist. Addresses elsewhere are not opened.
 
-    docs/book/check_links.py FOLDER"""
+docs/book/check_links.py FOLDER"""
 
 import re
 import sys

@@ -92,12 +92,16 @@ def bvh(shapes, width, depth=0):
 
 def draw(name, boxes, tested, nodes):
     """Boxes, shapes and the ray; `tested` are the shapes that the ray is tested against, in red."""
-    parts = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {SIZE + 2 * MARGIN} {SIZE + 2 * MARGIN + 26}" width="424" font-family="sans-serif">',
-             f'<rect width="100%" height="100%" fill="#fff"/><g transform="translate({MARGIN} {MARGIN})">']
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {SIZE + 2 * MARGIN} {SIZE + 2 * MARGIN + 26}" width="424" font-family="sans-serif">',
+        f'<rect width="100%" height="100%" fill="#fff"/><g transform="translate({MARGIN} {MARGIN})">',
+    ]
     for box, _, depth in boxes:
         fill = "#fff3d6" if nodes and crosses(box) and name in ("octree", "kdtree") else "none"
-        parts.append(f'<rect x="{box[0]:.1f}" y="{box[1]:.1f}" width="{box[2] - box[0]:.1f}" height="{box[3] - box[1]:.1f}" fill="{fill}" '
-                     f'stroke="{LINES[min(depth, 5)] if name.startswith("bvh") else "#1f6f8b"}" stroke-width="{1.2 if crosses(box) else 0.7}"/>')
+        parts.append(
+            f'<rect x="{box[0]:.1f}" y="{box[1]:.1f}" width="{box[2] - box[0]:.1f}" height="{box[3] - box[1]:.1f}" fill="{fill}" '
+            f'stroke="{LINES[min(depth, 5)] if name.startswith("bvh") else "#1f6f8b"}" stroke-width="{1.2 if crosses(box) else 0.7}"/>'
+        )
     for shape in SHAPES:
         color = "#d4483b" if shape in tested else "#c9ccd1"
         parts.append(f'<circle cx="{shape[0]:.1f}" cy="{shape[1]:.1f}" r="{shape[2]:.1f}" fill="{color}"/>')
@@ -117,10 +121,15 @@ def growth():
     left, top, width, height = 64, 14, 420, 300
     x = lambda n: left + (math.log10(n) - 2) / 3 * width
     y = lambda ns: top + height - (math.log10(ns) - 2) / 6 * height
-    parts = ['<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 580 360" width="580" font-family="sans-serif" font-size="13">', '<rect width="100%" height="100%" fill="#fff"/>']
+    parts = [
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 580 360" width="580" font-family="sans-serif" font-size="13">',
+        '<rect width="100%" height="100%" fill="#fff"/>',
+    ]
     for k in range(2, 9):
         label = {2: "100 ns", 3: "1 µs", 4: "10 µs", 5: "0.1 ms", 6: "1 ms", 7: "10 ms", 8: "0.1 s"}[k]
-        parts.append(f'<path d="M{left} {y(10 ** k):.1f}h{width}" stroke="#ddd"/><text x="{left - 6}" y="{y(10 ** k) + 4:.1f}" text-anchor="end">{label}</text>')
+        parts.append(
+            f'<path d="M{left} {y(10 ** k):.1f}h{width}" stroke="#ddd"/><text x="{left - 6}" y="{y(10 ** k) + 4:.1f}" text-anchor="end">{label}</text>'
+        )
     for row in rows:
         parts.append(f'<text x="{x(row[0]):.1f}" y="{top + height + 20}" text-anchor="middle">{row[0]:,.0f}</text>')
     parts.append(f'<text x="{left + width / 2}" y="{top + height + 40}" text-anchor="middle">triangles</text>')
@@ -132,7 +141,9 @@ def growth():
     for i, name in enumerate(names):
         points = " ".join(f"{x(row[0]):.1f},{y(row[i + 1]):.1f}" for row in rows)
         color = ["#d4483b", "#c0872b", "#8a4f9e", "#3a8f5c", "#1f6f8b"][i]
-        parts.append(f'<polyline points="{points}" fill="none" stroke="{color}" stroke-width="2"/><text x="{left + width + 8}" y="{ends[i]:.1f}" fill="{color}">{name}</text>')
+        parts.append(
+            f'<polyline points="{points}" fill="none" stroke="{color}" stroke-width="2"/><text x="{left + width + 8}" y="{ends[i]:.1f}" fill="{color}">{name}</text>'
+        )
     (FOLDER / "growth.svg").write_text("\n".join(parts) + "\n</svg>\n")
 
 

@@ -21,11 +21,13 @@ from PIL import Image
 
 BOOK = Path(__file__).resolve().parent
 sys.path.insert(0, str(BOOK / "gallery"))
+import glass  # noqa: E402
 import indoors  # noqa: E402
 import outdoors  # noqa: E402
+import studio  # noqa: E402
 
 PICTURES = BOOK / "src/pictures"
-SCENES = {function.__name__: function for function in outdoors.SCENES + indoors.SCENES}
+SCENES = {function.__name__: function for function in indoors.SCENES + glass.SCENES + studio.SCENES + outdoors.SCENES}
 # Largest size of a picture's file.
 MAX_BYTES = 400_000
 

@@ -19,12 +19,12 @@ def pool(folder):
     for _ in range(70):
         length = rng.uniform(0.35, 1.7)
         angle, phase = rng.uniform(0, 2 * math.pi), rng.uniform(0, 2 * math.pi)
-        height += 0.0021 * length ** 1.15 * np.sin(2 * math.pi / length * (x * math.cos(angle) + z * math.sin(angle)) + phase)
+        height += 0.0021 * length**1.15 * np.sin(2 * math.pi / length * (x * math.cos(angle) + z * math.sin(angle)) + phase)
     height_field(folder / "water.ply", height - 0.14, (12, 8))
     # Mosaic: 16 x 16 tiles an image.
     tiles = rng.normal(0, 0.05, (16, 16, 1)) + np.array([0.33, 0.72, 0.80])
     image = np.kron(tiles, np.ones((32, 32, 1)))
-    joint = (np.arange(512) % 32 < 2)
+    joint = np.arange(512) % 32 < 2
     image[joint[:, None] | joint[None, :]] = [0.80, 0.88, 0.88]
     write_png(folder / "tiles.png", image)
     stone = 0.80 + 0.035 * noise((512, 512), (6, 6), 5, 6)[..., None] * np.array([1, 1, 1.15]) + np.array([0.03, 0.0, -0.05])
@@ -33,11 +33,11 @@ def pool(folder):
     write_png(folder / "stone.png", stone)
     stripes = np.zeros((64, 384, 3))
     for k, color in enumerate([(0.95, 0.95, 0.93), (0.93, 0.30, 0.25), (0.95, 0.95, 0.93), (0.98, 0.75, 0.15), (0.95, 0.95, 0.93), (0.10, 0.42, 0.70)]):
-        stripes[:, 64 * k:64 * (k + 1)] = color
+        stripes[:, 64 * k : 64 * (k + 1)] = color
     write_png(folder / "stripes.png", stripes)
     float_ring = np.ones((64, 512, 3)) * [0.97, 0.96, 0.95]
     for k in range(8):
-        float_ring[:, 64 * k:64 * k + 32] = [0.96, 0.36, 0.42]
+        float_ring[:, 64 * k : 64 * k + 32] = [0.96, 0.36, 0.42]
     write_png(folder / "ring.png", float_ring)
     write_sky(folder / "sky.hdr", [0.20, 0.42, 0.90], [0.75, 0.9, 1.05], [0.5, 0.5, 0.48], [0.6, 0.55, 0.4], (0.5, 0.75, -0.45))
     depth = 1.5
@@ -50,8 +50,10 @@ def pool(folder):
         quad(origin=[6, -depth, -4], u=[0, 0, 8], v=[0, depth, 0], **wall),
         quad(origin=[6, -depth, 4], u=[-12, 0, 0], v=[0, depth, 0], **wall),
         # The deck around it, with a coping that overhangs.
-        box("stone", [0, -0.05, -8.0], [14, 0.05, 3.95]), box("stone", [0, -0.05, 8.0], [14, 0.05, 3.95]),
-        box("stone", [-10.0, -0.05, 0], [3.95, 0.05, 4.06]), box("stone", [10.0, -0.05, 0], [3.95, 0.05, 4.06]),
+        box("stone", [0, -0.05, -8.0], [14, 0.05, 3.95]),
+        box("stone", [0, -0.05, 8.0], [14, 0.05, 3.95]),
+        box("stone", [-10.0, -0.05, 0], [3.95, 0.05, 4.06]),
+        box("stone", [10.0, -0.05, 0], [3.95, 0.05, 4.06]),
         # A ring and a ball that float.
         ring("ring", 0.52, 0.19, turn(4, (1, 0, 0)), turn(25), move(-1.55, -0.09, 0.55), name="ring"),
         ball("ball", [1.9, 0.07, -1.5], 0.24, name="ball"),
@@ -62,7 +64,15 @@ def pool(folder):
         shapes.append(box("tiles", [5.0 - 0.0 * k, -0.35 - 0.3 * k - 0.6, -3.6 + 0.38 * k], [1.0, 0.6, 0.38]))
     # A ladder of steel.
     for side in (-0.27, 0.27):
-        bend = [(-3.2 + side, -1.1, -3.8), (-3.2 + side, 0.1, -3.8), (-3.2 + side, 0.62, -3.86), (-3.2 + side, 0.82, -4.1), (-3.2 + side, 0.80, -4.4), (-3.2 + side, 0.55, -4.6), (-3.2 + side, 0.0, -4.62)]
+        bend = [
+            (-3.2 + side, -1.1, -3.8),
+            (-3.2 + side, 0.1, -3.8),
+            (-3.2 + side, 0.62, -3.86),
+            (-3.2 + side, 0.82, -4.1),
+            (-3.2 + side, 0.80, -4.4),
+            (-3.2 + side, 0.55, -4.6),
+            (-3.2 + side, 0.0, -4.62),
+        ]
         shapes.append(tube("steel", bend, 0.026))
     for k in range(3):
         shapes.append(box("steel", [-3.2, -0.45 - 0.28 * k, -3.8], [0.26, 0.012, 0.05]))
@@ -74,7 +84,8 @@ def pool(folder):
         "textures": {
             "tiles": {"type": "image", "file": "tiles.png", "scale": [9, 6]},
             "stone": {"type": "image", "file": "stone.png", "scale": [10, 3]},
-            "stripes": {"type": "image", "file": "stripes.png"}, "ring": {"type": "image", "file": "ring.png"},
+            "stripes": {"type": "image", "file": "stripes.png"},
+            "ring": {"type": "image", "file": "ring.png"},
         },
         "materials": {
             "tiles": {"type": "diffuse", "albedo": {"texture": "tiles"}},
@@ -129,13 +140,27 @@ def lanterns(folder):
         shade = np.array([1.0, 0.30 + 0.04 * rng.normal(), 0.045]) * warm
         size = rng.uniform(0.42, 0.55)
         tilt = [{"scale": size}, turn(rng.normal(0, 7), (1, 0, 0)), turn(rng.normal(0, 7), (0, 0, 1)), move(x, y, z)]
-        shapes.append(turned("paper", [[0.62, -0.9], [0.70, -0.5], [0.86, 0.1], [0.88, 0.6], [0.70, 0.92], [0.35, 1.04], [0.0, 1.07]], *tilt,
-                             emission={"radiance": list(np.round(1.15 * shade, 3)), "texture": "glow", "two_sided": True}))
+        shapes.append(
+            turned(
+                "paper",
+                [[0.62, -0.9], [0.70, -0.5], [0.86, 0.1], [0.88, 0.6], [0.70, 0.92], [0.35, 1.04], [0.0, 1.07]],
+                *tilt,
+                emission={"radiance": list(np.round(1.15 * shade, 3)), "texture": "glow", "two_sided": True},
+            )
+        )
     for x, z in floating:
         warm = rng.uniform(0.7, 1.2)
         s = rng.uniform(0.20, 0.27)
-        shapes.append({"type": "cylinder", "material": "paper", "radius": s, "height": 1.7 * s, "transform": [UPRIGHT, move(x, 0.03, z)],
-                       "emission": {"radiance": list(np.round(np.array([1.3, 0.40, 0.06]) * warm, 3)), "texture": "glow", "two_sided": True}})
+        shapes.append(
+            {
+                "type": "cylinder",
+                "material": "paper",
+                "radius": s,
+                "height": 1.7 * s,
+                "transform": [UPRIGHT, move(x, 0.03, z)],
+                "emission": {"radiance": list(np.round(np.array([1.3, 0.40, 0.06]) * warm, 3)), "texture": "glow", "two_sided": True},
+            }
+        )
         shapes.append(disk("wood", [x, 0.035, z], 1.5 * s))
     v = np.linspace(0, 1, 256)[:, None]
     glow = np.clip(1.0 - 0.75 * v, 0, 1)[::-1] * np.ones((1, 64))
@@ -185,13 +210,21 @@ def cumulus(folder):
     nx, ny, nz = 176, 120, 112
     x, y, z = np.meshgrid(np.linspace(-1.55, 1.55, nx), np.linspace(0, 2.1, ny), np.linspace(-1, 1, nz), indexing="ij")
     body = np.full((nx, ny, nz), -9.0)
-    puffs = [(-0.55, 0.42, 0, 0.52), (0.1, 0.55, 0.05, 0.66), (0.75, 0.38, 0, 0.45), (0.2, 1.05, -0.05, 0.52), (-0.1, 1.45, 0, 0.36), (1.12, 0.26, 0.05, 0.27), (-1.0, 0.25, 0.05, 0.30)]
+    puffs = [
+        (-0.55, 0.42, 0, 0.52),
+        (0.1, 0.55, 0.05, 0.66),
+        (0.75, 0.38, 0, 0.45),
+        (0.2, 1.05, -0.05, 0.52),
+        (-0.1, 1.45, 0, 0.36),
+        (1.12, 0.26, 0.05, 0.27),
+        (-1.0, 0.25, 0.05, 0.30),
+    ]
     puffs += [(rng.uniform(-1, 1), rng.uniform(0.2, 0.7), rng.uniform(-0.35, 0.35), rng.uniform(0.18, 0.36)) for _ in range(16)]
     for a, b, c, r in puffs:
         body = np.maximum(body, 1 - np.sqrt((x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2) / r)
     # Billows: creases where noise is zero.
     cells = np.array([10, 7, 7])
-    billow = sum(0.55 ** k * np.abs(noise((nx, ny, nz), cells * 2 ** k, 50 + k, 1)) for k in range(4))
+    billow = sum(0.55**k * np.abs(noise((nx, ny, nz), cells * 2**k, 50 + k, 1)) for k in range(4))
     floor = np.clip((y - 0.10) / 0.12, 0, 1)
     density = np.clip((body + 0.62 * (billow - 0.62)) * 7, 0, 1) * floor
     density[0], density[-1], density[:, -1], density[:, :, 0], density[:, :, -1] = 0, 0, 0, 0, 0
@@ -207,19 +240,20 @@ def cumulus(folder):
         "integrator": {"type": "path", "max_depth": 64, "rr_depth": 16},
         "sampler": {"spp": 10},
         "textures": {"waves": {"type": "image", "file": "waves.png", "color_space": "linear", "scale": [150, 150]}},
-        "media": {"cloud": {
-            "scattering": 26, "absorption": 0.01, "phase": {"type": "henyey_greenstein", "g": 0.65},
-            "volume": {"density": {"type": "grid", "file": "cloud.raw", "resolution": [nx, ny, nz]}, "bounds": [[-2.3, 1.0, -1.5], [2.3, 4.1, 1.5]]},
-        }},
+        "media": {
+            "cloud": {
+                "scattering": 26,
+                "absorption": 0.01,
+                "phase": {"type": "henyey_greenstein", "g": 0.65},
+                "volume": {"density": {"type": "grid", "file": "cloud.raw", "resolution": [nx, ny, nz]}, "bounds": [[-2.3, 1.0, -1.5], [2.3, 4.1, 1.5]]},
+            }
+        },
         "materials": {
             "sea": {"type": "relief", "material": "water", "normal_map": {"texture": "waves", "strength": 0.45}},
             "water": {"type": "plastic", "albedo": [0.004, 0.012, 0.022], "ior": 1.33, "roughness": 0.12},
             "cloud": {"type": "dielectric", "ior": 1, "medium": "cloud"},
         },
-        "shapes": [
-            quad("sea", [-300, 0, 20], [600, 0, 0], [0, 0, -600]),
-            box("cloud", [0, 2.55, 0], [2.29, 1.54, 1.49]),
-        ],
+        "shapes": [quad("sea", [-300, 0, 20], [600, 0, 0], [0, 0, -600]), box("cloud", [0, 2.55, 0], [2.29, 1.54, 1.49])],
         "lights": [
             {"type": "environment", "file": "sky.hdr", "scale": 0.6},
             {"type": "directional", "direction": [1, -0.16, -0.42], "irradiance": [11, 5.0, 1.9], "angular_diameter_degrees": 0.53},

@@ -6,8 +6,8 @@ import struct
 import numpy as np
 from PIL import Image
 
-
 # Files.
+
 
 def write_ply(path, positions, triangles, normals=None, uvs=None, colors=None):
     """A binary PLY file; colours are linear floats."""
@@ -77,12 +77,13 @@ def write_sky(path, zenith, horizon, ground, glow=None, toward=(0, 0, -1), sharp
 
 # Noise.
 
+
 def noise(shape, cells, seed, octaves=5, gain=0.5):
     """Periodic value noise of any number of axes, from about -1 to 1."""
     rng = np.random.default_rng(seed)
     total, weight = np.zeros(shape), 1.0
     for octave in range(octaves):
-        count = [max(int(c * 2 ** octave), 1) for c in cells]
+        count = [max(int(c * 2**octave), 1) for c in cells]
         lattice = rng.uniform(-1, 1, count)
         for axis, (n, size) in enumerate(zip(count, shape)):
             at = (np.arange(size) + 0.5) / size * n
@@ -96,6 +97,7 @@ def noise(shape, cells, seed, octaves=5, gain=0.5):
 
 
 # Meshes.
+
 
 def grid(columns, rows):
     """Triangles of a grid of vertices, row by row."""
@@ -128,8 +130,15 @@ def rounded_box(path, half, radius, puff=0.0, steps=6, inner=10):
         lines = []
         for a in (u, v):
             flat = half[a] - radius
-            lines.append(np.concatenate([-half[a] + radius * (1 - np.cos(np.linspace(0, math.pi / 2, steps + 1)))[:-1] ** 1.0,
-                                         np.linspace(-flat, flat, inner), half[a] - radius * edge[:-1][::-1]]))
+            lines.append(
+                np.concatenate(
+                    [
+                        -half[a] + radius * (1 - np.cos(np.linspace(0, math.pi / 2, steps + 1)))[:-1] ** 1.0,
+                        np.linspace(-flat, flat, inner),
+                        half[a] - radius * edge[:-1][::-1],
+                    ]
+                )
+            )
         for side in (-1, 1):
             p = np.zeros((len(lines[1]), len(lines[0]), 3))
             p[..., axis], p[..., u], p[..., v] = side * half[axis], lines[0][None, :], lines[1][:, None]
@@ -245,8 +254,21 @@ def turned(material, points, *steps, **more):
 def ring(material, radius, tube, *steps, **more):
     """A torus about +y, of four Bezier curves."""
     k = 0.5523 * tube
-    circle = [[radius - tube, 0], [radius - tube, -k], [radius - k, -tube], [radius, -tube], [radius + k, -tube], [radius + tube, -k],
-              [radius + tube, 0], [radius + tube, k], [radius + k, tube], [radius, tube], [radius - k, tube], [radius - tube, k], [radius - tube, 0]]
+    circle = [
+        [radius - tube, 0],
+        [radius - tube, -k],
+        [radius - k, -tube],
+        [radius, -tube],
+        [radius + k, -tube],
+        [radius + tube, -k],
+        [radius + tube, 0],
+        [radius + tube, k],
+        [radius + k, tube],
+        [radius, tube],
+        [radius - k, tube],
+        [radius - tube, k],
+        [radius - tube, 0],
+    ]
     return {"type": "revolution", "material": material, "profile": {"bezier": circle}, "transform": list(steps), **more}
 
 
@@ -262,3 +284,16 @@ def lamp(origin, u, v, radiance, **more):
 
 
 LAMP = {"lamp": {"type": "diffuse", "albedo": 0}}
+
+
+def sweep(folder, material, width=14.0, back=-4.0, height=9.0, front=8.0, bend=2.5):
+    """A studio's backdrop: a floor that bends upward into a wall."""
+    angle = np.linspace(0, math.pi / 2, 40)
+    z = np.concatenate([[front], back + bend - bend * np.sin(angle), [back]])
+    y = np.concatenate([[0], bend - bend * np.cos(angle), [height]])
+    ny = np.concatenate([[1], np.cos(angle), [0]])
+    nz = np.concatenate([[0], np.sin(angle), [1]])
+    points = np.array([[x, b, c] for b, c in zip(y, z) for x in (-width, width)])
+    normals = np.array([[0, b, c] for b, c in zip(ny, nz) for _ in range(2)])
+    write_ply(folder / "sweep.ply", points, grid(2, len(z)), normals)
+    return [mesh(material, "sweep.ply", name="backdrop")]
