@@ -168,7 +168,7 @@ def fluffy(folder):
             "vertical_fov_degrees": 23,
             "lens": {"radius": 0.06, "focus_point": [-0.3, 1.2, 0.8]},
         },
-        "integrator": {"type": "path", "max_depth": 12},
+        "integrator": {"type": "path", "max_depth": 6},
         "sampler": {"spp": 4},
         "materials": LAMP
         | {
