@@ -72,7 +72,7 @@ def main():
         with tempfile.TemporaryDirectory() as folder:
             scene, png = write(name, Path(folder)), Path(folder) / f"{name}.png"
             if args.draft:
-                render(scene, png, "--size", "384x216", "--spp", "4")
+                render(scene, png, "--size", "640x360", "--spp", "6")
                 args.draft.mkdir(parents=True, exist_ok=True)
                 Image.open(png).save(args.draft / f"{name}.png")
             else:

@@ -169,7 +169,7 @@ def lanterns(folder):
         "film": {"width": 1280, "height": 720},
         "camera": {"position": [0, 2.3, 15], "look_at": [0, 6.2, -18], "vertical_fov_degrees": 42},
         "integrator": {"type": "path", "max_depth": 6},
-        "sampler": {"spp": 20},
+        "sampler": {"spp": 10},
         "textures": {
             "waves": {"type": "image", "file": "waves.png", "color_space": "linear", "scale": [90, 60]},
             "glow": {"type": "image", "file": "glow.png", "color_space": "linear"},
@@ -238,7 +238,7 @@ def cumulus(folder):
         "film": {"width": 1280, "height": 720},
         "camera": {"position": [0, 0.35, 8.4], "look_at": [0, 1.78, 0], "vertical_fov_degrees": 29},
         "integrator": {"type": "path", "max_depth": 64, "rr_depth": 16},
-        "sampler": {"spp": 10},
+        "sampler": {"spp": 6},
         "textures": {"waves": {"type": "image", "file": "waves.png", "color_space": "linear", "scale": [150, 150]}},
         "media": {
             "cloud": {
