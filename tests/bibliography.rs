@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::util::root;
+
 fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -33,10 +35,10 @@ fn titles(text: &str) -> BTreeSet<String> {
 
 #[test]
 fn cited_works_and_the_bibliography_are_the_same() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = root();
     let mut files = Vec::new();
-    for folder in ["src", "crates", "xtask/src"].map(|folder| root.join(folder)).iter().filter(|folder| folder.exists()) {
-        rust_files(folder, &mut files);
+    for folder in ["src", "crates", "xtask/src"] {
+        rust_files(&root.join(folder), &mut files);
     }
     let cited: BTreeSet<String> =
         files.iter().flat_map(|file| titles(&comments(&fs::read_to_string(file).unwrap()))).collect();
