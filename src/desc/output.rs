@@ -118,7 +118,7 @@ impl<'de> Deserialize<'de> for OutputEntry {
     }
 }
 
-/// The schema of an entry of [`outputs`].
+/// An output, or the name of its file alone.
 #[derive(JsonSchema)]
 #[serde(untagged)]
 #[schemars(inline)]
