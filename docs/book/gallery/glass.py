@@ -173,7 +173,7 @@ def drinks(folder):
             "lens": {"radius": 0.04, "focus_point": [0, 1, 0.4]},
         },
         "integrator": {"type": "path", "max_depth": 48, "rr_depth": 16, "clamp": 8},
-        "sampler": {"spp": 6},
+        "sampler": {"spp": 64},
         "textures": {
             "orange": {"type": "image", "file": "orange.png", "filter": "bilinear"},
             "slice": {"type": "image", "file": "slice.png", "filter": "bilinear"},
@@ -279,7 +279,7 @@ def jewels(folder):
             "lens": {"radius": 0.05, "focus_point": [-0.1, 1.9, 0.4]},
         },
         "integrator": {"type": "path", "max_depth": 40, "rr_depth": 20, "clamp": 12},
-        "sampler": {"spp": 10},
+        "sampler": {"spp": 96},
         "materials": LAMP
         | {
             "silk": {"type": "principled", "base_color": [0.035, 0.03, 0.06], "roughness": 0.38, "sheen": 0.6, "specular": 0.5},
@@ -340,7 +340,7 @@ def flacon(folder):
         "film": {"width": 1280, "height": 1024},
         "camera": {"position": [0, 2.05, 9.2], "look_at": [0, 1.78, 0], "vertical_fov_degrees": 23, "lens": {"radius": 0.09, "focus_point": [0, 1.7, 0.35]}},
         "integrator": {"type": "path", "max_depth": 32, "rr_depth": 16, "clamp": 10},
-        "sampler": {"spp": 8},
+        "sampler": {"spp": 64},
         "textures": {
             "marble": {"type": "image", "file": "marble.png", "scale": [0.45, 0.45]},
             "label": {"type": "image", "file": "label.png", "filter": "bilinear"},

@@ -321,7 +321,7 @@ def chess(folder):
             "lens": {"radius": 0.11, "focus_point": [0.5, 1.2, 2.45], "blades": {"count": 6, "rotation_degrees": 12}},
         },
         "integrator": {"type": "path", "max_depth": 12},
-        "sampler": {"spp": 20},
+        "sampler": {"spp": 64},
         "textures": {
             "light": wood("light.png"),
             "dark": wood("dark.png"),

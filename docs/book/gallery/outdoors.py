@@ -80,7 +80,7 @@ def pool(folder):
         "film": {"width": 1280, "height": 720},
         "camera": {"position": [0.3, 3.4, 6.3], "look_at": [0.1, -0.75, -0.6], "vertical_fov_degrees": 40},
         "integrator": {"type": "path", "max_depth": 16, "caustics": "photons"},
-        "sampler": {"spp": 10},
+        "sampler": {"spp": 48},
         "textures": {
             "tiles": {"type": "image", "file": "tiles.png", "scale": [9, 6]},
             "stone": {"type": "image", "file": "stone.png", "scale": [10, 3]},
@@ -169,7 +169,7 @@ def lanterns(folder):
         "film": {"width": 1280, "height": 720},
         "camera": {"position": [0, 2.3, 15], "look_at": [0, 6.2, -18], "vertical_fov_degrees": 42},
         "integrator": {"type": "path", "max_depth": 6},
-        "sampler": {"spp": 10},
+        "sampler": {"spp": 64},
         "textures": {
             "waves": {"type": "image", "file": "waves.png", "color_space": "linear", "scale": [90, 60]},
             "glow": {"type": "image", "file": "glow.png", "color_space": "linear"},
@@ -238,7 +238,7 @@ def cumulus(folder):
         "film": {"width": 1280, "height": 720},
         "camera": {"position": [0, 0.35, 8.4], "look_at": [0, 1.78, 0], "vertical_fov_degrees": 29},
         "integrator": {"type": "path", "max_depth": 64, "rr_depth": 16},
-        "sampler": {"spp": 6},
+        "sampler": {"spp": 48},
         "textures": {"waves": {"type": "image", "file": "waves.png", "color_space": "linear", "scale": [150, 150]}},
         "media": {
             "cloud": {

@@ -62,7 +62,7 @@ def cradle(folder):
             "lens": {"radius": 0.05, "focus_point": [0, 1.0, 0.3]},
         },
         "integrator": {"type": "path", "max_depth": 16},
-        "sampler": {"spp": 10},
+        "sampler": {"spp": 64},
         "textures": {"wood": {"type": "image", "file": "wood.png", "scale": [0.35, 0.35]}},
         "materials": LAMP
         | {
@@ -169,7 +169,7 @@ def fluffy(folder):
             "lens": {"radius": 0.06, "focus_point": [-0.3, 1.2, 0.8]},
         },
         "integrator": {"type": "path", "max_depth": 6},
-        "sampler": {"spp": 2},
+        "sampler": {"spp": 24},
         "materials": LAMP
         | {
             "floor": {"type": "diffuse", "albedo": [0.80, 0.62, 0.30]},
@@ -222,7 +222,7 @@ def attractor(_):
         "film": {"width": 1280, "height": 720},
         "camera": {"position": [0.5, 2.6, 9.2], "look_at": [0, 1.95, 0], "vertical_fov_degrees": 29, "lens": {"radius": 0.05, "focus_distance": 8.9}},
         "integrator": {"type": "path", "max_depth": 12},
-        "sampler": {"spp": 10},
+        "sampler": {"spp": 64},
         "materials": LAMP
         | {
             "floor": {"type": "plastic", "albedo": [0.012, 0.014, 0.02], "roughness": 0.28},
