@@ -19,6 +19,8 @@ mod bench_error;
 mod bench_scale;
 /// The catalogue of checks from the command line.
 mod bench_stability;
+/// Works that comments cite, and the bibliography of the book.
+mod bibliography;
 /// The book: its pages, scenes and links.
 mod book;
 /// What the cameras of the scene file see.

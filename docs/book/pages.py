@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A preprocessor of mdBook: adds every docs/*.md as a chapter, and makes relative links lead to chapters or to the repository."""
+"""A preprocessor of mdBook: adds every docs/*.md and docs/stability/*.md as a chapter, and makes relative links lead to chapters or to the repository."""
 
 import json
 import re
@@ -16,8 +16,7 @@ DEVELOPERS = ["accelerators", "agreement", "dependencies", "flaws", "numerics", 
 
 def file_of(chapter_path):
     """The file in the repository of a chapter."""
-    inside = PurePosixPath(chapter_path)
-    return f"docs/{inside.name}" if inside.parts[0] == "docs" else SRC + chapter_path
+    return chapter_path if chapter_path.startswith("docs/") else SRC + chapter_path
 
 
 def address(target, chapter_path):
@@ -29,7 +28,7 @@ def address(target, chapter_path):
     if file.startswith(SRC):
         # mdBook turns README.md into the index of its folder.
         inside = re.sub(r"(^|/)README\.md$", r"\1index.md", file[len(SRC):])
-    elif re.fullmatch(r"docs/[^/]+\.md", file):
+    elif re.fullmatch(r"docs/(stability/)?[^/]+\.md", file):
         inside = file
     else:
         return REPOSITORY + file + mark + anchor
@@ -49,10 +48,10 @@ def adjust(chapter):
 
 def document(file):
     text = file.read_text()
-    title = re.search(r"^# (.*)$", text, re.M)
-    path = f"docs/{file.name}"
+    title = "Checks of numerical stability" if file.stem == "stability" else re.search(r"^# (.*)$", text, re.M)[1]
+    path = file.relative_to(ROOT).as_posix()
     return {"Chapter": {
-        "name": title[1] if title else file.stem, "content": text, "number": None, "sub_items": [], "path": path,
+        "name": title, "content": text, "number": None, "sub_items": [], "path": path,
         "source_path": path, "parent_names": [],
     }}
 
@@ -62,9 +61,12 @@ if len(sys.argv) > 1 and sys.argv[1] == "supports":
 _, book = json.load(sys.stdin)
 items = book.get("items", book.get("sections"))
 files = sorted((ROOT / "docs").glob("*.md"))
-for part, of_developers in [("Topics", False), ("Figures and inside", True)]:
-    items.append({"PartTitle": part})
-    items += [document(file) for file in files if (file.stem in DEVELOPERS) == of_developers]
+topics = [document(file) for file in files if file.stem not in DEVELOPERS]
+notebooks = [document(file) for file in files if file.stem in DEVELOPERS]
+notebooks += [document(file) for file in sorted((ROOT / "docs/stability").glob("*.md"))]
+place = next(i for i, item in enumerate(items) if item == {"PartTitle": "For developers"})
+items[place:place] = [{"PartTitle": "Topics"}, *topics]
+items += [{"PartTitle": "Laboratory notebooks"}, *notebooks]
 for item in items:
     if "Chapter" in item:
         adjust(item["Chapter"])

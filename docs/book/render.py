@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Renders the pictures of the book into src/pictures: the rooms of the tutorial, and one scene for each example of a shape and a material.
+"""Renders the pictures of the book into src/pictures: the rooms of the tutorial, one scene for each example of a shape and a material, and the gallery.
 
-    docs/book/render.py                 all pictures
-    docs/book/render.py material_mix    these only
+    docs/book/render.py                              all pictures
+    docs/book/render.py material_mix gallery_pool    these only; gallery.py has more options for those of the gallery
 
 The program is $STERADIAN, or `steradian` of the PATH; Intel Open Image Denoise is needed ($STERADIAN_OIDN), and Pillow for the JPEG files."""
 
@@ -59,6 +59,9 @@ def main(wanted):
             scene = folder / f"{picture}.json"
             scene.write_text(json.dumps(stage))
             render(scene, picture, folder, "--spp", "128", "--size", "256x256")
+    gallery = [name.removeprefix("gallery_") for name in wanted if name.startswith("gallery_")]
+    if gallery or not wanted:
+        subprocess.run([sys.executable, BOOK / "gallery.py", *gallery], check=True)
 
 
 main(sys.argv[1:])

@@ -163,6 +163,18 @@ mod tests {
     }
 
     #[test]
+    fn an_output_may_be_its_file_alone() {
+        let outputs = |written: Value| read(json!({ "camera": {}, "outputs": written }))["outputs"].clone();
+        let long = outputs(json!([{ "file": "a.exr" }, { "file": "b.png" }]));
+        assert_eq!(outputs(json!(["a.exr", { "file": "b.png" }])), long);
+        assert_eq!(outputs(json!(["a.exr", "b.png"])), long);
+        assert_eq!(outputs(json!("a.exr")), outputs(json!([{ "file": "a.exr" }])));
+        for wrong in [json!([7]), json!([["a.exr"]]), json!([{ "layers": ["Z"] }])] {
+            assert!(serde_json::from_value::<SceneDesc>(json!({ "camera": {}, "outputs": wrong })).is_err());
+        }
+    }
+
+    #[test]
     fn one_number_stands_for_all() {
         let with = |grey: Value, scale: Value| {
             read(json!({

@@ -114,9 +114,9 @@ pub struct SceneDesc {
     #[serde(default, deserialize_with = "one_or_more", skip_serializing_if = "Vec::is_empty")]
     #[schemars(with = "OneOrMore<LightDesc>")]
     pub lights: Vec<LightDesc>,
-    /// Files to write; the command line's `-o` replaces them.
-    #[serde(default, deserialize_with = "one_or_more", skip_serializing_if = "Vec::is_empty")]
-    #[schemars(with = "OneOrMore<OutputDesc>")]
+    /// Files to write, each by its name alone or with more keys; the command line's `-o` replaces them.
+    #[serde(default, deserialize_with = "output::outputs", skip_serializing_if = "Vec::is_empty")]
+    #[schemars(with = "OneOrMore<output::OutputEntrySchema>")]
     pub outputs: Vec<OutputDesc>,
 }
 

@@ -1,9 +1,12 @@
 //! Outputs as written.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{Error, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::lists::{OneOrMore, one_or_more};
 
@@ -80,6 +83,51 @@ impl OutputDesc {
             view: None,
         }
     }
+}
+
+/// Reads a list of outputs, or one; each may be the name of its file alone.
+pub fn outputs<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<OutputDesc>, D::Error> {
+    let entries: Vec<OutputEntry> = one_or_more(deserializer)?;
+    Ok(entries.into_iter().map(|OutputEntry(output)| output).collect())
+}
+
+/// An output, or its file alone.
+struct OutputEntry(OutputDesc);
+
+impl<'de> Deserialize<'de> for OutputEntry {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Entry;
+
+        impl<'de> Visitor<'de> for Entry {
+            type Value = OutputDesc;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("the name of a file, or an output with the key \"file\"")
+            }
+
+            fn visit_str<E: Error>(self, file: &str) -> Result<Self::Value, E> {
+                Ok(OutputDesc::new(file))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, output: A) -> Result<Self::Value, A::Error> {
+                OutputDesc::deserialize(MapAccessDeserializer::new(output))
+            }
+        }
+
+        deserializer.deserialize_any(Entry).map(Self)
+    }
+}
+
+/// An output, or the name of its file alone.
+#[derive(JsonSchema)]
+#[serde(untagged)]
+#[schemars(inline)]
+#[expect(dead_code, reason = "only its schema is needed")]
+pub enum OutputEntrySchema {
+    /// The name of the file, with every default.
+    File(String),
+    /// With more keys.
+    Output(Box<OutputDesc>),
 }
 
 /// A layer of a picture.

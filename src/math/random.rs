@@ -13,7 +13,7 @@ pub fn hash64(n: u64) -> u64 {
     n ^ (n >> 31)
 }
 
-/// A bijective hash of 32 bits (Ellis, "Prospecting for Hash Functions": `lowbias32`), moved off the fixed point 0.
+/// A bijective hash of 32 bits (Wellons, "Prospecting for Hash Functions": `lowbias32`), moved off the fixed point 0.
 #[inline]
 pub fn mix_32(n: u32) -> u32 {
     let n = n.wrapping_add((STEP >> 32) as u32);
