@@ -15,7 +15,7 @@
 //! |---|---|
 //! | 0 | `id`, `error`, `memory`, `metal`, `printable`, `suggestion`, `bytes` |
 //! | 1 | `math`, `desc`, `file`, `attribute`, `image_data` |
-//! | 2 | `color`, `sampling`, `config` |
+//! | 2 | `color`, `sampling`, `config`, `subdivision` |
 //! | 3 | `assets`, `geometry`, `texture`, `bsdf`, `camera`, `film`, `guiding` |
 //! | 4 | `accel`, `material`, `medium`, `opacity`, `normal_perturbation`, `light`, `output` |
 //! | 5 | `scene`, `denoise` |
@@ -66,6 +66,7 @@ pub mod render;
 mod renderer;
 pub mod sampling;
 pub mod scene;
+mod subdivision;
 pub mod suggestion;
 pub mod texture;
 
