@@ -121,6 +121,8 @@ mod scene_files;
 mod self_intersection;
 /// Renders in parts, put together.
 mod shards;
+/// Subdivision surfaces and displacement.
+mod subdivision;
 /// Shadow as soft on coarse smooth meshes as on the surfaces they approximate, without leaks.
 mod terminator;
 /// Images smaller in the picture than they are.

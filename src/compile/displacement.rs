@@ -14,7 +14,8 @@ use crate::math::{DVec3, Vec2, Vec3};
 use crate::texture::Texture;
 
 impl Builder {
-    /// Moves the vertices of a mesh by a texture and computes their normals. `sharing` is that of a subdivision surface.
+    /// Moves the vertices of a mesh by a texture and computes their normals. `sharing` is that of a subdivision
+    /// surface.
     pub(super) fn displace(
         &self,
         path: &str,

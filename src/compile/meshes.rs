@@ -123,28 +123,27 @@ fn load_faces(
             Ok(meshes)
         }
         (None, Some(positions), Some(faces)) if desc.deform_files.is_empty() => {
-            let (positions, origin) = MeshData::rounded(positions);
-            let data = MeshData {
-                positions,
-                normals: desc.normals.clone(),
-                uvs: desc.uvs.clone(),
-                attributes: inline_attributes(files, path, desc)?,
-                origin,
-                ..faces
-            };
-            let at = |positions: &Vec<[f64; 3]>| {
-                let (positions, origin) = MeshData::rounded(positions);
-                MeshData { positions, origin, attributes: BTreeMap::new(), ..data.clone() }
-            };
-            let later = desc.deform_positions.iter().map(at).collect();
-            Ok(vec![LoadedMesh { data, later, material: None }])
+            let data = MeshData { attributes: inline_attributes(files, path, desc)?, ..faces };
+            Ok(vec![load_inline(desc, positions, data)])
         }
         _ => Err(files.error(
             path,
-            "a mesh needs either `file`, or `positions` and `triangles` or `faces` (with optional `normals`, `uvs`, `colors` and \
-             `attributes`)",
+            "a mesh needs either `file`, or `positions` and `triangles` or `faces` (with optional `normals`, `uvs`, \
+             `colors` and `attributes`)",
         )),
     }
+}
+
+/// A mesh without a file, given its faces and attributes.
+fn load_inline(desc: &MeshDesc, positions: &[[f64; 3]], given: MeshData) -> LoadedMesh {
+    let (positions, origin) = MeshData::rounded(positions);
+    let data = MeshData { positions, normals: desc.normals.clone(), uvs: desc.uvs.clone(), origin, ..given };
+    let at = |positions: &Vec<[f64; 3]>| {
+        let (positions, origin) = MeshData::rounded(positions);
+        MeshData { positions, origin, attributes: BTreeMap::new(), ..data.clone() }
+    };
+    let later = desc.deform_positions.iter().map(at).collect();
+    LoadedMesh { data, later, material: None }
 }
 
 /// The attributes of a mesh without a file, its colours among them.

@@ -98,8 +98,8 @@ pub struct CornerDesc {
     pub sharpness: f32,
 }
 
-/// Moves the vertices of a mesh by a texture: by `scale` times what the texture is above `midlevel`. Lengths are those of
-/// the mesh's own space, before its `transform`.
+/// Moves the vertices of a mesh by a texture: by `scale` times what the texture is above `midlevel`. Lengths are those
+/// of the mesh's own space, before its `transform`.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DisplacementDesc {

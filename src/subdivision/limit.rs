@@ -88,7 +88,8 @@ impl Net<'_> {
         tangent(f64::cos).cross(tangent(f64::sin))
     }
 
-    /// On one side of a crease (Biermann, Levin and Zorin, "Piecewise Smooth Subdivision Surfaces with Normal Control").
+    /// On one side of a crease (Biermann, Levin and Zorin, "Piecewise Smooth Subdivision Surfaces with Normal
+    /// Control").
     fn crease_normal(&self, at: DVec3, fan: &Fan) -> DVec3 {
         let last = fan.ends.len() - 1;
         let (ends, inner) = (fan.ends[0] + fan.ends[last], 1..last);

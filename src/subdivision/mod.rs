@@ -2,9 +2,9 @@
 //! Meshes") and Loop's ("Smooth Subdivision Surfaces Based on Triangles"), with semi-sharp creases (DeRose, Kass and
 //! Truong, "Subdivision Surfaces in Character Animation"), by the rules of OpenSubdiv.
 //!
-//! The faces of a cage are refined level by level, all of them or those with too long edges. Then the vertices are moved
-//! to the limit surface and get its normals. A face beside finer ones has their vertices on its edges, so that there are
-//! no cracks.
+//! The faces of a cage are refined level by level, all of them or those with too long edges. Then the vertices are
+//! moved to the limit surface and get its normals. A face beside finer ones has their vertices on its edges, so that
+//! there are no cracks.
 
 mod edges;
 mod limit;

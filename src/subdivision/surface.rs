@@ -6,7 +6,7 @@ use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, IntoParallelRef
 
 use super::edges::{Edges, Faces, NONE};
 use super::rules::{Kind, Net};
-use super::stitch::{Leaves, Vertices};
+use super::stitch::Leaves;
 use super::{Cage, Refined, Refinement, SHARP, Scheme, UvRule};
 use crate::math::DVec3;
 
@@ -51,6 +51,7 @@ pub struct Surface {
     has_uvs: bool,
     creases: HashMap<[u32; 2], f32>,
     corners: HashMap<u32, f32>,
+    /// Layers on the limit surface, and its normals at each time.
     limits: Vec<Vec<DVec3>>,
     normals: Vec<Vec<DVec3>>,
     leaves: Leaves,
@@ -227,32 +228,36 @@ impl Surface {
         for face in (0..self.faces.len()).filter(|&face| self.is_real[face]) {
             self.faces.corners(face).for_each(|corner| is_seen[points.corners[corner] as usize] = true);
         }
-        let seen: Vec<u32> = (0..points.count).filter(|&point| is_seen[point as usize]).collect();
         let normals = &edges[self.smooth];
         let point_of = |vertex: u32| points.corners[normals.corners_at(vertex)[0] as usize];
         let fans: Vec<u32> =
             normals.vertices().into_iter().filter(|&vertex| is_seen[point_of(vertex) as usize]).collect();
         let sharpness = self.edge_sharpness();
-        let of_time = |time: usize| {
-            let layer = &self.layers[time];
-            let net = self.net(layer, edges, &sharpness);
-            let place = |&point: &u32| net.limit_point(point, &layer.values);
-            let turn = |&v: &u32| net.limit_normal(point_of(v), normals.corners_at(v), normals, &layer.values);
-            let places: Vec<DVec3> = seen.par_iter().with_min_len(AT_ONCE).map(place).collect();
-            let turns: Vec<DVec3> = fans.par_iter().with_min_len(AT_ONCE).map(turn).collect();
-            (places, turns)
+        let layers = self.layers.len();
+        let places_of = |layer: &Layer| {
+            let (net, channel) = (self.net(layer, edges, &sharpness), &edges[layer.channel]);
+            let point_of = |vertex: u32| points.corners[channel.corners_at(vertex)[0] as usize];
+            let which: Vec<u32> = channel.vertices().into_iter().filter(|&v| is_seen[point_of(v) as usize]).collect();
+            let place = |&vertex: &u32| net.limit_point(vertex, &layer.values);
+            let values: Vec<DVec3> = which.par_iter().with_min_len(AT_ONCE).map(place).collect();
+            (which, values)
         };
-        let found: Vec<(Vec<DVec3>, Vec<DVec3>)> = (0..self.times).map(of_time).collect();
-        let counts = [points.count as usize, smooth.count as usize];
-        self.limits.resize(self.times, Vec::new());
+        let places: Vec<(Vec<u32>, Vec<DVec3>)> = self.layers.iter().map(places_of).collect();
+        let turns_of = |layer: &Layer| {
+            let net = self.net(layer, edges, &sharpness);
+            let turn = |&v: &u32| net.limit_normal(point_of(v), normals.corners_at(v), normals, &layer.values);
+            fans.par_iter().with_min_len(AT_ONCE).map(turn).collect()
+        };
+        let turns: Vec<Vec<DVec3>> = self.layers[..self.times].iter().map(turns_of).collect();
+        let count = smooth.count as usize;
+        self.limits.resize(layers, Vec::new());
         self.normals.resize(self.times, Vec::new());
-        for (time, (places, turns)) in found.into_iter().enumerate() {
-            for (list, count, which, values) in
-                [(&mut self.limits[time], counts[0], &seen, places), (&mut self.normals[time], counts[1], &fans, turns)]
-            {
-                list.resize(count, DVec3::ZERO);
-                which.iter().zip(values).for_each(|(&i, value)| list[i as usize] = value);
-            }
+        for (i, (which, values)) in places.into_iter().enumerate() {
+            let count = self.channels[self.layers[i].channel].count as usize;
+            put(&mut self.limits[i], count, &which, values);
+        }
+        for (i, values) in turns.into_iter().enumerate() {
+            put(&mut self.normals[i], count, &fans, values);
         }
     }
 
@@ -420,13 +425,20 @@ impl Surface {
         let gather = |values: &[DVec3], ids: &[u32]| -> Vec<[f32; 3]> {
             ids.iter().map(|&id| values[id as usize].as_vec3().to_array()).collect()
         };
-        let mut linear = self.layers[self.times..].iter().map(|layer| values_of(layer, &vertices));
-        let uvs = if self.has_uvs { linear.next() } else { None };
+        let placed: Vec<Vec<[f32; 3]>> = self
+            .layers
+            .iter()
+            .zip(&self.limits)
+            .map(|(layer, values)| gather(values, &vertices.of_channel(layer.channel)))
+            .collect();
+        let mut placed = placed.into_iter();
+        let positions = placed.by_ref().take(self.times).collect();
+        let uvs = if self.has_uvs { placed.next() } else { None };
         Refined {
-            positions: self.limits.iter().map(|values| gather(values, &points)).collect(),
+            positions,
             normals: self.normals.iter().map(|values| gather(values, &smooth)).collect(),
             uvs: uvs.map(|uvs| uvs.into_iter().map(|[u, v, _]| [u, v]).collect()),
-            linear: linear.collect(),
+            linear: placed.collect(),
             triangles,
             faces,
             points,
@@ -437,8 +449,8 @@ impl Surface {
     }
 }
 
-/// The values of a layer at the vertices of the result.
-fn values_of(layer: &Layer, vertices: &Vertices) -> Vec<[f32; 3]> {
-    let ids = vertices.of_channel(layer.channel);
-    ids.iter().map(|&id| layer.values[id as usize].as_vec3().to_array()).collect()
+/// Puts values in their places of a list of this length.
+fn put(list: &mut Vec<DVec3>, count: usize, places: &[u32], values: Vec<DVec3>) {
+    list.resize(count, DVec3::ZERO);
+    places.iter().zip(values).for_each(|(&place, value)| list[place as usize] = value);
 }
