@@ -5,12 +5,12 @@ use std::collections::HashSet;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
-use steradian::assets;
-use steradian::assets::MeshData;
-use steradian::config::{self, Trust};
-use steradian::geometry::{CurveBasis, CurveKind, Curves, Strands};
-use steradian::import::{self, ImportOptions};
-use steradian::render::RenderProvenance;
+use steradian::internal::assets;
+use steradian::internal::assets::MeshData;
+use steradian::internal::config::{self, Trust};
+use steradian::internal::geometry::{CurveBasis, CurveKind, Curves, Strands};
+use steradian::internal::import::{self, ImportOptions};
+use steradian::internal::render::RenderProvenance;
 
 /// Reads `data` as a file of `kind`, which is the name of a target, in `folder`, which only this caller writes to.
 /// Malformed files are errors; anything else is a finding.
@@ -118,4 +118,10 @@ fn look_at(mesh: &MeshData) {
     let count = mesh.positions.len();
     assert!(mesh.normals.as_ref().is_none_or(|normals| normals.len() == count));
     assert!(mesh.uvs.as_ref().is_none_or(|uvs| uvs.len() == count));
+    let corners = if mesh.faces.is_empty() {
+        3 * mesh.triangles.len()
+    } else {
+        mesh.faces.iter().map(|&size| size as usize).sum()
+    };
+    assert_eq!(mesh.face_corners().len(), corners);
 }

@@ -4,11 +4,11 @@ use std::collections::HashMap;
 
 use image::{ImageBuffer, Luma, Rgb};
 use serde_json::{Value, json};
-use steradian::accel::{self, AccelKind};
-use steradian::geometry::{Geometry, Mesh, Shape};
-use steradian::id::PrimId;
-use steradian::math::{Ray, Vec3};
-use steradian::render::Overrides;
+use steradian::internal::accel::{self, AccelKind};
+use steradian::internal::geometry::{Geometry, Mesh, Shape};
+use steradian::internal::id::PrimId;
+use steradian::internal::math::{Ray, Vec3};
+use steradian::internal::render::Overrides;
 
 use crate::bad_input::assert_faults;
 use crate::util::folder::{Folder, good_scene, set};

@@ -8,10 +8,10 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde_json::Value;
 use steradian::Rendering;
-use steradian::bench::error::flip;
 use steradian::desc::{OutputDesc, PixelTypeDesc, ViewDesc};
-use steradian::film::Image;
-use steradian::output::{self, RenderInfo};
+use steradian::internal::film::Image;
+use steradian::internal::output::{self, RenderInfo};
+use steradian_bench::error::flip;
 
 use crate::convert::{from_json, picture};
 use crate::errors::OrRaise;
