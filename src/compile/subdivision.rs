@@ -166,7 +166,9 @@ fn control(
     for &size in &sizes {
         let (face, others) = rest.split_at(size as usize);
         let points: Vec<u32> = face.iter().map(|&vertex| shared[vertex as usize] as u32).collect();
-        if (1..points.len()).any(|i| points[..i].contains(&points[i])) {
+        let mut sorted = points.clone();
+        sorted.sort_unstable();
+        if sorted.windows(2).any(|pair| pair[0] == pair[1]) {
             dropped += 1;
         } else {
             cage.sizes.push(size);

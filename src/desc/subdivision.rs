@@ -18,8 +18,8 @@ pub struct SubdivisionDesc {
     /// `edge_length`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub levels: Option<u32>,
-    /// Refines only faces with an edge of more pixels than this, above 0, as seen face-on from the camera when the
-    /// shutter opens; of an object, its 64 instances that look largest count. Default: all faces are refined.
+    /// Refines only faces with an edge of more pixels of the `film` than this, above 0, as seen face-on from the camera
+    /// when the shutter opens; of an object, its 64 instances that look largest count. Default: all faces are refined.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edge_length: Option<f64>,
     /// Edges that are creases. Default: none.

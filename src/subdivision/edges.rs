@@ -93,15 +93,24 @@ impl Edges {
         let corners_at = |v: u32| &around[offsets[v as usize] as usize..offsets[v as usize + 1] as usize];
         let look = |corner: usize| {
             let (from, to) = (vertices[corner], vertices[faces.next(corner)]);
-            let toward = |at: u32, end: u32| {
-                corners_at(at).iter().copied().filter(move |&c| vertices[faces.next(c as usize)] == end)
-            };
-            let (mut along, mut back) = (toward(from, to), toward(to, from));
-            let first = [along.next(), back.next()].into_iter().flatten().min().unwrap_or(corner as u32);
-            let opposite = toward(to, from).next();
-            let is_plain = along.next().is_none() && back.next().is_none();
-            let is_shared = opposite.is_some() || !is_plain;
-            (first, opposite.filter(|_| is_plain).unwrap_or(NONE), is_shared)
+            // The end with fewer faces: at the apex of a fan there may be any number.
+            let [at, other] = if corners_at(from).len() < corners_at(to).len() { [from, to] } else { [to, from] };
+            let (mut first, mut along, mut back, mut opposite) = (corner as u32, 0, 0, NONE);
+            for &c in corners_at(at) {
+                let previous = faces.previous(c as usize);
+                let out = (vertices[faces.next(c as usize)] == other).then_some(c);
+                let into = (vertices[previous] == other).then_some(previous as u32);
+                for same in [out, into].into_iter().flatten() {
+                    first = first.min(same);
+                    if vertices[same as usize] == from {
+                        along += 1;
+                    } else {
+                        (back, opposite) = (back + 1, same);
+                    }
+                }
+            }
+            let twin = if along == 1 && back == 1 { opposite } else { NONE };
+            (first, twin, along + back > 1)
         };
         let found: Vec<(u32, u32, bool)> = (0..vertices.len()).into_par_iter().with_min_len(1024).map(look).collect();
         let (mut of, mut first) = (Vec::with_capacity(vertices.len()), Vec::new());

@@ -131,7 +131,8 @@ pub fn refine(cage: Cage, how: &Refinement) -> Refined {
         } else {
             surface.too_long(how.is_too_long)
         };
-        if surface.emit(&chosen, how.max_triangles) {
+        let most = if level < smallest { u64::MAX } else { how.max_triangles };
+        if surface.emit(&chosen, most) {
             break;
         }
         surface = surface.refined(&chosen, edges);

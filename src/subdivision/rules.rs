@@ -67,12 +67,15 @@ impl Net<'_> {
             let (next, previous) = (self.faces.next(corner), self.faces.previous(corner));
             for (corner, end) in [(corner, next), (previous, previous)] {
                 let (edge, sharpness) = (self.edges.of[corner], self.sharpness(corner));
-                if sharpness > 0.0 && !found.iter().any(|known| known.edge == edge) {
+                if sharpness > 0.0 {
                     let is_border = self.edges.twin[corner] == NONE;
                     found.push(SharpEdge { edge, end: self.vertices[end], sharpness, is_border });
                 }
             }
         }
+        // Most edges are those of two faces.
+        found.sort_unstable_by_key(|sharp| sharp.edge);
+        found.dedup_by_key(|sharp| sharp.edge);
         found
     }
 
