@@ -1,6 +1,6 @@
 //! Subdivision surfaces and displacement as users give them.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use image::{ImageBuffer, Luma, Rgb};
 use serde_json::{Value, json};
@@ -18,9 +18,9 @@ use crate::util::render::{prepare, render_with};
 fn cube(more: Value) -> Value {
     let at = |i: u32| [0, 1, 2].map(|axis| if i >> axis & 1 == 1 { 1 } else { -1 });
     let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let uvs = [[0, 0], [1, 0], [1, 1], [0, 1]].repeat(6);
     let mut mesh = json!({
-        "type": "mesh", "positions": faces.iter().flatten().map(|&i| at(i)).collect::<Vec<_>>(),
-        "uvs": [[0, 0], [1, 0], [1, 1], [0, 1]].repeat(6),
+        "type": "mesh", "positions": faces.iter().flatten().map(|&i| at(i)).collect::<Vec<_>>(), "uvs": uvs,
         "faces": (0..6).map(|i| [4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 3]).collect::<Vec<_>>()
     });
     mesh.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
@@ -60,11 +60,13 @@ fn folder() -> Folder {
 }
 
 fn meshes(geometry: &Geometry) -> Vec<&Mesh> {
-    let mesh = |shape: &'_ _| match shape {
-        Shape::Mesh(mesh) => Some(mesh),
-        _ => None,
-    };
-    geometry.shapes.iter().filter_map(mesh).collect()
+    let mut found = Vec::new();
+    for shape in &geometry.shapes {
+        if let Shape::Mesh(mesh) = shape {
+            found.push(mesh);
+        }
+    }
+    found
 }
 
 /// Asserts that every edge between two positions has one triangle on each side.
@@ -93,8 +95,8 @@ fn a_cube_of_six_charts_becomes_one_surface() {
     assert!(mesh.has_normals() && mesh.has_uvs());
     assert_closed(mesh);
     // The limit of a corner with three faces.
-    let half = mesh.positions().iter().filter(|p| p.iter().all(|x| (x.abs() - 0.5).abs() < 1e-6)).count();
-    assert_eq!(half, 24);
+    let half = mesh.positions().iter().filter(|p| p.iter().all(|x| (x.abs() - 0.5).abs() < 1e-6));
+    assert_eq!(half.map(|p| p.map(|x| x > 0.0)).collect::<HashSet<_>>().len(), 8);
     let apart = cube(json!({ "smooth_by": "index", "subdivision": { "levels": 1 } }));
     let scene = scene_of(apart);
     assert!(meshes(&scene.geometry)[0].positions().iter().all(|p| p.iter().any(|x| x.abs() == 1.0)));
@@ -144,6 +146,8 @@ fn every_accelerator_meets_edges_and_every_number_of_threads_gives_the_same_bits
     };
     let (one, three) = (render(1), render(3));
     assert!(one == three);
+    // Those of this program; Embree's hits differ within rounding.
+    assert!(one[1..].windows(2).all(|images| images[0] == images[1]));
 }
 
 #[test]
