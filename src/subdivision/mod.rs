@@ -115,7 +115,7 @@ pub fn triangle_count(scheme: Scheme, corners: u64, faces: u64, levels: u32) -> 
 
 /// Refines a cage.
 pub fn refine(cage: Cage, how: &Refinement) -> Refined {
-    let mut surface = surface::Surface::new(cage, how);
+    let mut surface = surface::RefinedSurface::new(cage, how);
     let (smallest, is_adaptive) = (u32::from(how.scheme == Scheme::CatmullClark), how.is_too_long.is_some());
     let levels = how.levels.max(smallest);
     for level in 0..=levels {

@@ -34,7 +34,7 @@ struct Layer {
 }
 
 /// Faces of one level and all vertices of levels so far. A vertex keeps its number from level to level.
-pub struct Surface {
+pub struct RefinedSurface {
     scheme: Scheme,
     is_adaptive: bool,
     faces: Faces,
@@ -84,7 +84,7 @@ fn moved_values(from: &[u32], values: &[DVec3], to: &Channel) -> Vec<DVec3> {
     moved
 }
 
-impl Surface {
+impl RefinedSurface {
     /// The cage itself.
     pub fn new(cage: Cage, how: &Refinement) -> Self {
         let faces = Faces::new(cage.sizes.iter().copied());
