@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::Scheme;
 use super::edges::{Edges, NONE};
-use super::rules::{Net, Rule};
+use super::rules::{Net, VertexRule};
 use crate::math::DVec3;
 
 /// What is around a point, counter-clockwise: the ends of edges, and what is across each face (with triangles, nothing
@@ -20,11 +20,11 @@ impl Net<'_> {
     pub fn limit_normal(&self, vertex: u32, corners: &[u32], normals: &Edges, values: &[DVec3]) -> DVec3 {
         let at = values[vertex as usize];
         let normal = match self.rule(vertex) {
-            Rule::Smooth => {
+            VertexRule::Smooth => {
                 let start = self.edges.corners_at(vertex)[0] as usize;
                 self.smooth_normal(&self.fan(start, self.edges, values))
             }
-            Rule::Crease(a, b) => {
+            VertexRule::Crease(a, b) => {
                 let start = corners.iter().map(|&c| c as usize).find(|&c| normals.twin[c] == NONE);
                 let fan = start.map(|start| (start, self.fan(start, normals, values)));
                 let is_side = |start: usize, fan: &Fan| {
@@ -37,7 +37,7 @@ impl Net<'_> {
                     _ => self.mean_normal(at, corners, values),
                 }
             }
-            Rule::Corner => self.mean_normal(at, corners, values),
+            VertexRule::Corner => self.mean_normal(at, corners, values),
         };
         normal.normalize_or_zero()
     }

@@ -20,7 +20,7 @@ pub enum Kind {
 
 /// What sharpness makes of a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rule {
+pub enum VertexRule {
     Smooth,
     /// On the crease between these two vertices.
     Crease(u32, u32),
@@ -88,25 +88,25 @@ impl Net<'_> {
     }
 
     /// The rule for a vertex with these sharp edges after all sharpness has gone down by `less`.
-    fn rule_of(&self, vertex: u32, sharp: &[SharpEdge], less: f32) -> Rule {
+    fn rule_of(&self, vertex: u32, sharp: &[SharpEdge], less: f32) -> VertexRule {
         let is_sharp = |sharpness: f32| sharpness >= SHARP || sharpness > less;
         let borders = sharp.iter().filter(|edge| edge.is_border).count();
         let border_allows = if self.kind == Kind::Smooth { matches!(borders, 0 | 2) } else { borders == 0 };
         if self.kind == Kind::Linear || !border_allows || is_sharp(self.point_sharpness(vertex)) {
-            return Rule::Corner;
+            return VertexRule::Corner;
         }
         let mut ends = sharp.iter().filter(|edge| is_sharp(edge.sharpness)).map(|edge| edge.end);
         match (ends.next(), ends.next(), ends.next()) {
-            (Some(a), Some(b), None) => Rule::Crease(a, b),
-            (_, _, Some(_)) => Rule::Corner,
-            _ => Rule::Smooth,
+            (Some(a), Some(b), None) => VertexRule::Crease(a, b),
+            (_, _, Some(_)) => VertexRule::Corner,
+            _ => VertexRule::Smooth,
         }
     }
 
     /// The rule for a vertex.
-    pub fn rule(&self, vertex: u32) -> Rule {
+    pub fn rule(&self, vertex: u32) -> VertexRule {
         if self.kind == Kind::Linear {
-            return Rule::Corner;
+            return VertexRule::Corner;
         }
         self.rule_of(vertex, &self.sharp_edges(vertex), 0.0)
     }
@@ -122,16 +122,16 @@ impl Net<'_> {
         sums
     }
 
-    fn moved_by(&self, rule: Rule, vertex: u32, values: &[DVec3], face_points: &[DVec3]) -> DVec3 {
+    fn moved_by(&self, rule: VertexRule, vertex: u32, values: &[DVec3], face_points: &[DVec3]) -> DVec3 {
         let at = values[vertex as usize];
         match rule {
-            Rule::Corner => at,
-            Rule::Crease(a, b) => at * 0.75 + (values[a as usize] + values[b as usize]) * 0.125,
-            Rule::Smooth if self.scheme == Scheme::CatmullClark => {
+            VertexRule::Corner => at,
+            VertexRule::Crease(a, b) => at * 0.75 + (values[a as usize] + values[b as usize]) * 0.125,
+            VertexRule::Smooth if self.scheme == Scheme::CatmullClark => {
                 let (n, ends, faces) = self.ring(vertex, values, |corner| face_points[self.faces.face(corner)]);
                 at * ((n - 2.0) / n) + (ends + faces) / (n * n)
             }
-            Rule::Smooth => {
+            VertexRule::Smooth => {
                 let (n, ends, _) = self.ring(vertex, values, |_| DVec3::ZERO);
                 let beta = beta(self.scheme, n);
                 at * (1.0 - n * beta) + ends * beta
@@ -188,9 +188,9 @@ impl Net<'_> {
     pub fn limit_point(&self, vertex: u32, values: &[DVec3]) -> DVec3 {
         let at = values[vertex as usize];
         match self.rule(vertex) {
-            Rule::Corner => at,
-            Rule::Crease(a, b) => (at * 4.0 + (values[a as usize] + values[b as usize])) / 6.0,
-            Rule::Smooth if self.scheme == Scheme::CatmullClark => {
+            VertexRule::Corner => at,
+            VertexRule::Crease(a, b) => (at * 4.0 + (values[a as usize] + values[b as usize])) / 6.0,
+            VertexRule::Smooth if self.scheme == Scheme::CatmullClark => {
                 let across = |corner: usize| {
                     let corner = self.faces.next(self.faces.next(corner));
                     values[self.vertices[corner] as usize]
@@ -198,7 +198,7 @@ impl Net<'_> {
                 let (n, ends, across) = self.ring(vertex, values, across);
                 (at * (n * n) + ends * 4.0 + across) / (n * (n + 5.0))
             }
-            Rule::Smooth => {
+            VertexRule::Smooth => {
                 let (n, ends, _) = self.ring(vertex, values, |_| DVec3::ZERO);
                 let weight = 1.0 / (n + 3.0 / (8.0 * beta(self.scheme, n)));
                 at * (1.0 - n * weight) + ends * weight
