@@ -268,20 +268,28 @@ fn impossible_surfaces_are_refused() {
     short["faces"] = json!([[0, 1]]);
     let mut far = with(json!({}));
     far["positions"][3] = json!([1e300, 0, 0]);
-    let place = |key: &str| format!("shapes[0].{key}");
-    for (shape, key, message) in [
-        (with(json!({ "levels": 17 })), "subdivision.levels", "from 0 to 16, not 17"),
-        (with(json!({ "levels": 12 })), "subdivision", "which allows 9 levels"),
-        (with(json!({ "edge_length": 0 })), "subdivision.edge_length", "above 0"),
-        (with(json!({ "max_triangles": 0 })), "subdivision.max_triangles", "from 1 to"),
-        (crease(json!([0, 24]), json!(1)), "subdivision.creases[0].vertices", "no vertex 24: there are only 24"),
-        (crease(json!([0, 2]), json!(1)), "subdivision.creases[0].vertices", "no face has an edge from vertex 0 to"),
-        (crease(json!([0]), json!(1)), "subdivision.creases[0].vertices", "two vertices or more"),
-        (crease(json!([0, 1]), json!(-1)), "subdivision.creases[0].sharpness", "not below 0"),
-        (displaced(json!({ "texture": "none" })), "displacement.texture", "no texture named"),
-        (short, "faces[0]", "three corners or more, not 2"),
-    ] {
-        assert_faults(&[("shapes[0]", shape, &place(key), message)]);
+    let faults = [
+        (with(json!({ "levels": 17 })), "shapes[0].subdivision.levels", "from 0 to 16, not 17"),
+        (with(json!({ "levels": 12 })), "shapes[0].subdivision", "which allows 9 levels"),
+        (with(json!({ "edge_length": 0 })), "shapes[0].subdivision.edge_length", "above 0"),
+        (with(json!({ "max_triangles": 0 })), "shapes[0].subdivision.max_triangles", "from 1 to"),
+        (
+            crease(json!([0, 24]), json!(1)),
+            "shapes[0].subdivision.creases[0].vertices",
+            "no vertex 24: there are only 24",
+        ),
+        (
+            crease(json!([0, 2]), json!(1)),
+            "shapes[0].subdivision.creases[0].vertices",
+            "no face has an edge from vertex 0 to",
+        ),
+        (crease(json!([0]), json!(1)), "shapes[0].subdivision.creases[0].vertices", "two vertices or more"),
+        (crease(json!([0, 1]), json!(-1)), "shapes[0].subdivision.creases[0].sharpness", "not below 0"),
+        (displaced(json!({ "texture": "none" })), "shapes[0].displacement.texture", "no texture named"),
+        (short, "shapes[0].faces[0]", "three corners or more, not 2"),
+    ];
+    for (shape, place, message) in faults {
+        assert_faults(&[("shapes[0]", shape, place, message)]);
     }
     assert_faults(&[
         ("shapes[0]", displaced(json!({ "texture": "tiles" })), "shapes[0]", "the mesh has no uv"),
