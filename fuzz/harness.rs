@@ -118,4 +118,10 @@ fn look_at(mesh: &MeshData) {
     let count = mesh.positions.len();
     assert!(mesh.normals.as_ref().is_none_or(|normals| normals.len() == count));
     assert!(mesh.uvs.as_ref().is_none_or(|uvs| uvs.len() == count));
+    let corners = if mesh.faces.is_empty() {
+        3 * mesh.triangles.len()
+    } else {
+        mesh.faces.iter().map(|&size| size as usize).sum()
+    };
+    assert_eq!(mesh.face_corners().len(), corners);
 }

@@ -32,6 +32,7 @@ nee_only        nee             208x156  8s    --strategy light
 fog             fog             256x168  384
 clouds          clouds          288x162  512
 fur             fur             288x180  256
+subdivision     subdivision     288x162  256
 glossy          glossy          270x180  2048
 principled      principled      176x264  1024
 skin            skin            288x180  512

@@ -15,7 +15,7 @@
 //! |---|---|
 //! | 0 | `id`, `error`, `memory`, `metal`, `printable`, `suggestion`, `bytes` |
 //! | 1 | `math`, `desc`, `file`, `attribute`, `image_data` |
-//! | 2 | `color`, `sampling`, `config` |
+//! | 2 | `color`, `sampling`, `config`, `subdivision` |
 //! | 3 | `assets`, `geometry`, `texture`, `bsdf`, `camera`, `film`, `guiding` |
 //! | 4 | `accel`, `material`, `medium`, `opacity`, `normal_perturbation`, `light`, `output` |
 //! | 5 | `scene`, `denoise` |
@@ -60,6 +60,7 @@ mod render;
 mod renderer;
 mod sampling;
 mod scene;
+mod subdivision;
 mod subsurface;
 mod suggestion;
 mod texture;

@@ -121,6 +121,8 @@ mod scene_faults;
 mod scene_files;
 /// Renders in parts, put together.
 mod shards;
+/// Subdivision surfaces and displacement.
+mod subdivision;
 /// Random walks below surfaces.
 mod subsurface;
 /// Shadow as soft on coarse smooth meshes as on the surfaces they approximate, without leaks.

@@ -100,7 +100,7 @@ impl Hash {
     }
 
     fn mesh(&mut self, mesh: &MeshData) {
-        let MeshData { positions, triangles, normals, uvs, attributes, origin } = mesh;
+        let MeshData { positions, triangles, faces, normals, uvs, attributes, origin } = mesh;
         self.numbers(triangles.as_flattened().iter().copied(), u32::to_le_bytes);
         let triples = [Some(positions), normals.as_ref()].map(|list| list.map(|list| list.as_flattened()));
         let pairs = uvs.as_ref().map(|list| list.as_flattened());
@@ -115,6 +115,9 @@ impl Hash {
         }
         if *origin != [0.0; 3] {
             self.numbers(origin.iter().copied(), f64::to_le_bytes);
+        }
+        if !faces.is_empty() {
+            self.numbers(faces.iter().copied(), u32::to_le_bytes);
         }
     }
 

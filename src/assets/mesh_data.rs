@@ -13,6 +13,8 @@ pub struct MeshData {
     pub positions: Vec<[f32; 3]>,
     /// Corners of each triangle.
     pub triangles: Vec<[u32; 3]>,
+    /// The number of corners of each face, of which the triangles are the fans; empty if all are triangles.
+    pub faces: Vec<u32>,
     /// A normal for each vertex.
     pub normals: Option<Vec<[f32; 3]>>,
     /// A uv for each vertex, with the origin at the bottom left.
@@ -87,6 +89,12 @@ impl MeshData {
         let first =
             first.ok_or_else(|| AssetError::Malformed("the file has more than 4,294,967,295 vertices".into()))?;
         self.positions.append(&mut other.positions);
+        if !(self.faces.is_empty() && other.faces.is_empty()) {
+            for mesh in [&mut *self, &mut other] {
+                mesh.count_faces();
+            }
+            self.faces.append(&mut other.faces);
+        }
         self.triangles.extend(other.triangles.iter().map(|triangle| triangle.map(|i| i + first)));
         if let (Some(normals), Some(others)) = (&mut self.normals, &mut other.normals) {
             normals.append(others);
@@ -124,8 +132,33 @@ impl MeshData {
 
     /// Adds a convex polygon as a fan around its first corner; fewer than three corners add nothing.
     pub fn push_polygon(&mut self, corners: &[u32]) {
+        if corners.len() > 3 || corners.len() == 3 && !self.faces.is_empty() {
+            self.count_faces();
+            self.faces.push(corners.len() as u32);
+        }
         for pair in corners.windows(2).skip(1) {
             self.triangles.push([corners[0], pair[0], pair[1]]);
         }
+    }
+
+    /// Fills the list of faces, where all so far are triangles.
+    fn count_faces(&mut self) {
+        if self.faces.is_empty() {
+            self.faces = vec![3; self.triangles.len()];
+        }
+    }
+
+    /// The corners of each face, one face behind the other.
+    pub fn face_corners(&self) -> Vec<u32> {
+        if self.faces.is_empty() {
+            return self.triangles.as_flattened().to_vec();
+        }
+        let mut corners = Vec::with_capacity(self.faces.iter().sum::<u32>() as usize);
+        let mut triangles = self.triangles.iter();
+        for &size in &self.faces {
+            corners.extend(triangles.next().into_iter().flatten());
+            corners.extend(triangles.by_ref().take(size as usize - 3).map(|t| t[2]));
+        }
+        corners
     }
 }

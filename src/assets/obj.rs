@@ -68,7 +68,7 @@ pub fn read_obj(path: &Path, materials: bool) -> Result<Vec<ObjMesh>, AssetError
     let trouble: RefCell<Option<AssetError>> = RefCell::new(None);
     let maps: RefCell<HashMap<String, ObjMaps>> = RefCell::default();
     let missing = Cell::new(false);
-    let options = tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
+    let options = tobj::LoadOptions { single_index: true, triangulate: false, ignore_points: true, ignore_lines: true };
     let loaded = tobj::load_obj_buf(&mut text.as_bytes(), &options, |mtl| {
         if !materials {
             return Ok(Default::default());
@@ -205,14 +205,22 @@ fn from_tobj(mesh: &tobj::Mesh) -> MeshData {
     let colors: Vec<[f32; 3]> =
         mesh.vertex_color.as_chunks::<3>().0.iter().map(|color| color.map(linear_from_srgb)).collect();
     let colors = (colors.len() == positions.len()).then_some(colors);
-    MeshData {
+    let mut data = MeshData {
         normals: (normals.len() == positions.len()).then_some(normals),
         uvs: (uvs.len() == positions.len()).then_some(uvs),
         positions,
-        triangles: mesh.indices.as_chunks::<3>().0.to_vec(),
         ..MeshData::default()
+    };
+    if mesh.face_arities.is_empty() {
+        data.triangles = mesh.indices.as_chunks::<3>().0.to_vec();
     }
-    .with_colors(colors)
+    let mut rest = mesh.indices.as_slice();
+    for &size in &mesh.face_arities {
+        let (corners, others) = rest.split_at(size as usize);
+        data.push_polygon(corners);
+        rest = others;
+    }
+    data.with_colors(colors)
 }
 
 #[cfg(test)]

@@ -13,6 +13,17 @@ impl Camera {
         self.film_of(self.camera_from_world(time).transform_point3(p), size)
     }
 
+    /// How many pixels of a picture of `size` pixels a unit of length at the world point `p` takes, seen face-on when
+    /// the shutter opens; without end at a camera with a place.
+    pub fn pixels_per_length(&self, p: DVec3, size: [u32; 2]) -> f64 {
+        let (distance, height) = (self.camera_from_world(0.0).transform_point3(p).length(), f64::from(size[1]));
+        match self.projection {
+            Projection::Perspective { half_height, .. } => height / (2.0 * half_height * distance),
+            Projection::Orthographic { half_height } => height / (2.0 * half_height),
+            Projection::Environment => height / (PI * distance),
+        }
+    }
+
     /// [`film_point`](Self::film_point) of what lies infinitely far away in a direction; `None` for an orthographic
     /// camera too.
     pub fn film_direction(&self, direction: DVec3, size: [u32; 2], time: f32) -> Option<DVec2> {

@@ -23,6 +23,13 @@ pub struct LoadedMesh {
     pub material: Option<ObjMaterial>,
 }
 
+impl LoadedMesh {
+    /// The mesh at each time.
+    pub fn steps(&self) -> impl Iterator<Item = &MeshData> {
+        std::iter::once(&self.data).chain(&self.later)
+    }
+}
+
 /// The meshes of a scene's files, read in parallel before the shapes are placed one after another.
 #[derive(Default)]
 pub struct MeshStore {
@@ -52,15 +59,49 @@ impl MeshStore {
 }
 
 fn load(files: &CompileContext, path: &str, desc: &MeshDesc, attributes: &BTreeSet<String>) -> Result<Vec<LoadedMesh>> {
+    let mut meshes = load_faces(files, path, desc, attributes)?;
+    if desc.subdivision.is_none() {
+        meshes.iter_mut().for_each(|mesh| mesh.data.faces = Vec::new());
+    }
+    Ok(meshes)
+}
+
+/// The triangles and faces of a mesh without a file.
+fn inline_faces(files: &CompileContext, path: &str, desc: &MeshDesc) -> Result<Option<MeshData>> {
+    let mut data = MeshData::default();
+    match (&desc.triangles, &desc.faces) {
+        (Some(triangles), None) => data.triangles.clone_from(triangles),
+        (None, Some(faces)) => {
+            for (i, face) in faces.iter().enumerate() {
+                if face.len() < 3 {
+                    let message = format!("a face has three corners or more, not {}", face.len());
+                    return Err(files.error(&format!("{path}.faces[{i}]"), message));
+                }
+                data.push_polygon(face);
+            }
+        }
+        _ => return Ok(None),
+    }
+    Ok(Some(data))
+}
+
+fn load_faces(
+    files: &CompileContext,
+    path: &str,
+    desc: &MeshDesc,
+    attributes: &BTreeSet<String>,
+) -> Result<Vec<LoadedMesh>> {
     for (key, times) in [("deform_files", desc.deform_files.len()), ("deform_positions", desc.deform_positions.len())] {
         if times >= Mesh::MAX_STEPS {
             let message = format!("{times} further times: there can be {}", Mesh::MAX_STEPS - 1);
             return Err(files.error(&format!("{path}.{key}"), message));
         }
     }
-    match (&desc.file, &desc.positions, &desc.triangles) {
+    match (&desc.file, &desc.positions, inline_faces(files, path, desc)?) {
         (Some(file), None, None)
-            if desc.normals.is_none()
+            if desc.triangles.is_none()
+                && desc.faces.is_none()
+                && desc.normals.is_none()
                 && desc.uvs.is_none()
                 && desc.colors.is_none()
                 && desc.attributes.is_empty()
@@ -81,29 +122,28 @@ fn load(files: &CompileContext, path: &str, desc: &MeshDesc, attributes: &BTreeS
             }
             Ok(meshes)
         }
-        (None, Some(positions), Some(triangles)) if desc.deform_files.is_empty() => {
-            let (positions, origin) = MeshData::rounded(positions);
-            let data = MeshData {
-                positions,
-                triangles: triangles.clone(),
-                normals: desc.normals.clone(),
-                uvs: desc.uvs.clone(),
-                attributes: inline_attributes(files, path, desc)?,
-                origin,
-            };
-            let at = |positions: &Vec<[f64; 3]>| {
-                let (positions, origin) = MeshData::rounded(positions);
-                MeshData { positions, origin, attributes: BTreeMap::new(), ..data.clone() }
-            };
-            let later = desc.deform_positions.iter().map(at).collect();
-            Ok(vec![LoadedMesh { data, later, material: None }])
+        (None, Some(positions), Some(faces)) if desc.deform_files.is_empty() => {
+            let data = MeshData { attributes: inline_attributes(files, path, desc)?, ..faces };
+            Ok(vec![load_inline(desc, positions, data)])
         }
         _ => Err(files.error(
             path,
-            "a mesh needs either `file`, or `positions` and `triangles` (with optional `normals`, `uvs`, `colors` and \
-             `attributes`)",
+            "a mesh needs either `file`, or `positions` and `triangles` or `faces` (with optional `normals`, `uvs`, \
+             `colors` and `attributes`)",
         )),
     }
+}
+
+/// A mesh without a file, given its faces and attributes.
+fn load_inline(desc: &MeshDesc, positions: &[[f64; 3]], given: MeshData) -> LoadedMesh {
+    let (positions, origin) = MeshData::rounded(positions);
+    let data = MeshData { positions, normals: desc.normals.clone(), uvs: desc.uvs.clone(), origin, ..given };
+    let at = |positions: &Vec<[f64; 3]>| {
+        let (positions, origin) = MeshData::rounded(positions);
+        MeshData { positions, origin, attributes: BTreeMap::new(), ..data.clone() }
+    };
+    let later = desc.deform_positions.iter().map(at).collect();
+    LoadedMesh { data, later, material: None }
 }
 
 /// The attributes of a mesh without a file, its colours among them.
@@ -192,6 +232,28 @@ fn check_counts(data: &MeshData) -> Result<(), String> {
         return Err(MeshError::Count { what: "uvs", count: uvs.len(), vertices: count }.to_string());
     }
     attributes::check_counts(&data.attributes, count, data.triangles.len())
+}
+
+/// Checks what is computed with before a mesh is placed.
+pub fn check_buffers(data: &MeshData, later: &[MeshData]) -> Result<(), String> {
+    check_counts(data)?;
+    if let Some(i) = data.uvs.iter().flatten().position(|uv| !uv.iter().all(|x| x.is_finite())) {
+        return Err(MeshError::Uv(i).to_string());
+    }
+    let vertices = data.positions.len();
+    if let Some(normals) = data.normals.as_ref().filter(|normals| normals.len() != vertices) {
+        return Err(MeshError::Count { what: "normals", count: normals.len(), vertices }.to_string());
+    }
+    for step in std::iter::once(data).chain(later) {
+        if step.positions.len() != vertices {
+            let count = step.positions.len();
+            return Err(MeshError::Count { what: "positions at a later time", count, vertices }.to_string());
+        }
+        if let Some(i) = step.positions.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
+            return Err(MeshError::Position(i).to_string());
+        }
+    }
+    Ok(())
 }
 
 /// Moves a mesh to its place and checks it. A mirrored mesh is wound the other way round, so that its front stays the

@@ -8,6 +8,8 @@ mod check;
 mod coincident;
 mod composites;
 mod curves;
+mod dicing;
+mod displacement;
 mod faults;
 mod file_cache;
 mod hair;
@@ -28,6 +30,7 @@ mod prepared;
 mod principled;
 mod settings;
 mod shapes;
+mod subdivision;
 mod summary;
 mod textures;
 mod transforms;
@@ -38,7 +41,7 @@ pub use file_cache::FileCache;
 pub use settings::{CheckedScene, check_film_and_integrator};
 pub use summary::Summary;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -56,6 +59,7 @@ use crate::scene::{Scene, SceneFeatures, Surface};
 use crate::suggestion::did_you_mean;
 use crate::texture::Texture;
 
+use dicing::Dicing;
 use faults::Faults;
 use identities::IdentityTable;
 use lights::LightTable;
@@ -94,6 +98,11 @@ impl CheckedScene<'_> {
             files,
             shutter: Shutter::from(camera.shutter()),
             surroundings: camera.places(),
+            dicing: Dicing {
+                camera: camera.clone(),
+                size: [desc.film.width, desc.film.height],
+                instances: BTreeMap::new(),
+            },
             materials,
             geometry: Geometry::default(),
             surfaces: Vec::new(),
@@ -212,6 +221,7 @@ struct Builder {
     shutter: Shutter,
     /// Beyond this, planes reach: bounds of the camera's places and, in the end, of all other shapes.
     surroundings: Bounds,
+    dicing: Dicing,
     materials: MaterialTable,
     geometry: Geometry,
     /// By shape.

@@ -1,6 +1,7 @@
 //! Smooth normals for meshes that have none: averaged over the triangles around a position, up to creases.
 
 use std::collections::HashMap;
+use std::hash::Hash;
 
 use crate::desc::{NormalWeightDesc, SmoothByDesc};
 use crate::math::DVec3;
@@ -55,15 +56,25 @@ fn facets(positions: &[[f32; 3]], triangles: &[[u32; 3]], weight: NormalWeightDe
     triangles.iter().map(|triangle| Facet::new(triangle.map(at), weight)).collect()
 }
 
-/// For each vertex the first one that counts as the same.
-fn shared_vertices(positions: &[[f32; 3]], by: SmoothByDesc) -> Vec<usize> {
+/// For each vertex the first one that counts as the same, at all times.
+pub fn shared_vertices(steps: &[&[[f32; 3]]], by: SmoothByDesc) -> Vec<usize> {
+    let count = steps.first().map_or(0, |positions| positions.len());
     if by == SmoothByDesc::Index {
-        return (0..positions.len()).collect();
+        return (0..count).collect();
     }
-    let mut first_at = HashMap::with_capacity(positions.len());
     // Adding zero makes -0 and 0 the same.
     let key = |p: &[f32; 3]| p.map(|x| (x + 0.0).to_bits());
-    positions.iter().enumerate().map(|(i, p)| *first_at.entry(key(p)).or_insert(i)).collect()
+    let mut shared = vec![0; count];
+    for positions in steps {
+        shared = first_of(shared.iter().copied().zip(positions.iter().map(key)));
+    }
+    shared
+}
+
+/// For each key, the place of the first that is equal.
+pub fn first_of<T: Eq + Hash>(keys: impl ExactSizeIterator<Item = T>) -> Vec<usize> {
+    let mut first_at = HashMap::with_capacity(keys.len());
+    keys.enumerate().map(|(i, key)| *first_at.entry(key).or_insert(i)).collect()
 }
 
 /// Normals of the vertices, without creases. Vertices that count as the same share their normal.
@@ -73,7 +84,16 @@ pub fn smooth(
     weight: NormalWeightDesc,
     by: SmoothByDesc,
 ) -> Vec<[f32; 3]> {
-    let shared = shared_vertices(positions, by);
+    smooth_shared(positions, triangles, weight, &shared_vertices(&[positions], by))
+}
+
+/// As [`smooth`], where the vertices that share a normal are given by the first of them.
+pub fn smooth_shared(
+    positions: &[[f32; 3]],
+    triangles: &[[u32; 3]],
+    weight: NormalWeightDesc,
+    shared: &[usize],
+) -> Vec<[f32; 3]> {
     let mut sums = vec![DVec3::ZERO; positions.len()];
     for (triangle, facet) in triangles.iter().zip(facets(positions, triangles, weight)) {
         for k in 0..3 {
@@ -93,7 +113,7 @@ pub fn split(
     by: SmoothByDesc,
     crease_cosine: f64,
 ) -> Split {
-    let shared = shared_vertices(steps[0], by);
+    let shared = shared_vertices(&steps[..1], by);
     let by_step: Vec<Vec<Facet>> = steps.iter().map(|positions| facets(positions, triangles, weight)).collect();
     let mut around: HashMap<usize, Vec<(usize, usize)>> = HashMap::new();
     for (t, triangle) in triangles.iter().enumerate() {

@@ -7,7 +7,7 @@ use super::Builder;
 use super::faults::Faults;
 use super::nesting::Nesting;
 use super::prepared::PreparedShape;
-use crate::desc::{InstanceDesc, SceneDesc, UsedNames};
+use crate::desc::{InstanceDesc, MeshDesc, SceneDesc, ShapeDesc, SubdivisionDesc, UsedNames};
 use crate::error::Result;
 use crate::film::PlacementId;
 use crate::geometry::{Instance, Object};
@@ -47,6 +47,13 @@ impl Builder {
             all.world.extend(others.into_iter().map(|prepared| (i, prepared)));
         }
         all.nesting = faults.keep(Nesting::new(&self.files, desc));
+        if let Some(nesting) = &all.nesting
+            && desc.used_shapes(used).any(|(_, shape)| is_diced(shape))
+        {
+            let still = Motion::constant(DAffine3::IDENTITY);
+            let level = Level { desc, nesting, path: "instances", outer: &still, placement: None };
+            faults.keep(self.find_instances(&level, &desc.instances));
+        }
         for (name, object) in &desc.objects {
             let is_used = used.objects.contains(name);
             let mut shapes = Vec::new();
@@ -148,6 +155,19 @@ impl Builder {
             }
             let path = format!("objects.{name}.instances");
             self.instance_bounds(&Level { path: &path, outer: &outer, ..*level }, own, &inner.instances, bounds)?;
+        }
+        Ok(())
+    }
+
+    /// Finds where the instances of objects and those inside of them are when the shutter opens.
+    fn find_instances(&mut self, level: &Level, instances: &[InstanceDesc]) -> Result<()> {
+        for (i, instance) in instances.iter().enumerate() {
+            let name = instance.object.as_str();
+            let Some(inner) = level.desc.objects.get(name).filter(|_| !level.nesting.is_empty(name)) else { continue };
+            let outer = self.instance_motion(level, &format!("{}[{i}]", level.path), instance)?;
+            self.dicing.instances.entry(name.into()).or_default().push(outer.map_at(0.0));
+            let path = format!("objects.{name}.instances");
+            self.find_instances(&Level { path: &path, outer: &outer, ..*level }, &inner.instances)?;
         }
         Ok(())
     }
@@ -272,4 +292,9 @@ struct Level<'a> {
     path: &'a str,
     outer: &'a Motion,
     placement: Option<PlacementId>,
+}
+
+/// Whether it depends on the camera how a shape is refined.
+fn is_diced(shape: &ShapeDesc) -> bool {
+    matches!(shape, ShapeDesc::Mesh(MeshDesc { subdivision: Some(SubdivisionDesc { edge_length: Some(_), .. }), .. }))
 }

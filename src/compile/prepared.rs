@@ -60,6 +60,13 @@ struct PlacedBy {
     motion: Option<Motion>,
 }
 
+impl PlacedBy {
+    /// Where it stands when the shutter opens.
+    fn at_first(&self) -> DAffine3 {
+        self.motion.as_ref().map_or(self.map, |motion| motion.map_at(0.0))
+    }
+}
+
 #[derive(Clone, Debug)]
 enum ShapeSource {
     Analytic(Analytic),
@@ -151,7 +158,7 @@ impl Builder {
                 }
                 return Ok(Vec::new());
             }
-            ShapeDesc::Mesh(mesh) => return self.prepare_mesh(path, mesh, &map, motion.as_ref(), surface),
+            ShapeDesc::Mesh(mesh) => return self.prepare_mesh(path, mesh, &PlacedBy { map, motion }, surface),
             ShapeDesc::Cube(_) => ShapeSource::Mesh {
                 data: meshes::cube(),
                 shading: MeshShadingDesc::Flat,
@@ -173,14 +180,13 @@ impl Builder {
         &mut self,
         path: &str,
         desc: &MeshDesc,
-        map: &DAffine3,
-        motion: Option<&Motion>,
+        placed: &PlacedBy,
         surface: PreparedSurface,
     ) -> Result<Vec<PreparedShape>> {
         let smoothing = self.smoothing(path, desc)?;
         let mut prepared = Vec::new();
         for mut loaded in self.meshes.take(&self.files, path, desc)? {
-            let moves = motion.is_some() || !loaded.later.is_empty();
+            let moves = placed.motion.is_some() || !loaded.later.is_empty();
             let PreparedSurface { mut binding, mut emission, mut identity } = surface;
             let has_uvs = loaded.data.uvs.is_some();
             if let Some(mtl) = &loaded.material {
@@ -209,6 +215,9 @@ impl Builder {
             if moves && emission.is_some() {
                 return Err(self.files.error(path, "a shape that emits light cannot move"));
             }
+            let places = self.dicing.places(path, placed.at_first());
+            let sharing = self.subdivide(path, desc, &mut loaded, &places)?;
+            self.displace(path, desc, &mut loaded, sharing)?;
             prepared.push(PreparedShape {
                 form: ShapeSource::Mesh {
                     data: loaded.data,
@@ -217,8 +226,8 @@ impl Builder {
                     later: loaded.later,
                     file: desc.file.clone(),
                 },
-                map: *map,
-                motion: motion.cloned(),
+                map: placed.map,
+                motion: placed.motion.clone(),
                 reverse_normal: desc.reverse_normal,
                 surface,
                 path: path.into(),

@@ -87,7 +87,7 @@ impl ShapeDesc {
     /// The mesh in a PLY or OBJ file, or one that [`Renderer::with_mesh`](crate::Renderer::with_mesh) adds under this
     /// name.
     pub fn mesh_file(file: impl Into<String>) -> Self {
-        Self::Mesh(MeshDesc { file: Some(file.into()), ..MeshDesc::empty() })
+        Self::Mesh(MeshDesc::from_file(file))
     }
 
     /// Sets the material by its name.
@@ -127,12 +127,18 @@ impl ShapeDesc {
 }
 
 impl MeshDesc {
+    /// The mesh of a file, with every other default.
+    pub fn from_file(file: impl Into<String>) -> Self {
+        Self { file: Some(file.into()), ..Self::empty() }
+    }
+
     /// A mesh without data, to be filled in.
     pub fn empty() -> Self {
         Self {
             file: None,
             positions: None,
             triangles: None,
+            faces: None,
             normals: None,
             uvs: None,
             colors: None,
@@ -143,6 +149,8 @@ impl MeshDesc {
             crease_angle_degrees: None,
             normal_weight: NormalWeightDesc::default(),
             smooth_by: SmoothByDesc::default(),
+            subdivision: None,
+            displacement: None,
             name: None,
             material: None,
             transform: Default::default(),

@@ -20,6 +20,7 @@ mod principled;
 mod relief;
 mod settings;
 mod shape;
+mod subdivision;
 mod texture;
 mod transform;
 mod used;
@@ -50,6 +51,10 @@ pub use shape::{
     ConeDesc, CubeDesc, CurvesDesc, CylinderDesc, DiskDesc, InstanceDesc, MeshDesc, ObjectDesc, OpacityDesc, PlaneDesc,
     PointsDesc, ProfileDesc, ProfileParameterDesc, QuadDesc, RevolutionDesc, ShapeCommon, ShapeCommonMut, ShapeDesc,
     SphereDesc,
+};
+pub use subdivision::{
+    BoundaryDesc, CornerDesc, CreaseDesc, DisplacementDesc, DisplacementSpaceDesc, SubdivisionDesc,
+    SubdivisionSchemeDesc, SubdivisionUvsDesc,
 };
 pub use texture::{ChannelDesc, ColorSpaceDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
 pub use transform::{KeyframeDesc, ScaleDesc, TransformDesc, TransformStepDesc};

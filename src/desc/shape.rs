@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::curves::{CurveBasisDesc, CurveKindDesc, radius_scale};
 use super::lists::{OneOrMore, one_or_more};
 use super::mesh::{AttributeDesc, MeshShadingDesc, NormalWeightDesc, SmoothByDesc};
-use super::{EmissionDesc, KeyframeDesc, TransformDesc};
+use super::{DisplacementDesc, EmissionDesc, KeyframeDesc, SubdivisionDesc, TransformDesc};
 
 /// Declares the shapes: a struct for each, the fields that all share, and the enum over them.
 macro_rules! shapes {
@@ -156,6 +156,9 @@ shapes! {
         /// Inline: corners of each triangle as indices from 0, counter-clockwise seen from the front.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         triangles: Option<Vec<[u32; 3]>>,
+        /// Inline, in place of `triangles`: corners of each face, three or more; convex faces but for subdivision.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        faces: Option<Vec<Vec<u32>>>,
         /// Inline: a normal for each vertex.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         normals: Option<Vec<[f32; 3]>>,
@@ -191,6 +194,13 @@ shapes! {
         /// Where normals are computed: what triangles around a vertex are. Default: `position`.
         #[serde(default)]
         smooth_by: SmoothByDesc,
+        /// Makes a subdivision surface of the mesh. Vertices that count as the same, by `smooth_by`, are one. Normals
+        /// are those of the limit surface unless `shading` is `computed` or `flat`. Default: none.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        subdivision: Option<SubdivisionDesc>,
+        /// Moves the vertices, after subdivision; then normals are computed unless `shading` is `flat`. Default: none.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        displacement: Option<DisplacementDesc>,
     }
     /// A sphere about the origin, or the part of it between two heights and within an angle about +z. u is the angle
     /// over `phi_max`; v runs from the bottom to the top of what is kept, by the angle from -z.
@@ -375,28 +385,6 @@ fn is_one(value: &f64) -> bool {
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
-}
-
-impl MeshDesc {
-    /// The mesh of a file, with every other default.
-    pub fn from_file(file: impl Into<String>) -> Self {
-        let shading = MeshShadingDesc::default();
-        Self::new(
-            Some(file.into()),
-            None,
-            None,
-            None,
-            None,
-            None,
-            BTreeMap::new(),
-            Vec::new(),
-            Vec::new(),
-            shading,
-            None,
-            NormalWeightDesc::default(),
-            SmoothByDesc::default(),
-        )
-    }
 }
 
 fn one() -> f64 {

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::{SceneDesc, ShapeDesc, TextureDesc};
+use super::{MeshDesc, SceneDesc, ShapeDesc, TextureDesc};
 
 /// Names of objects, materials, textures and media that the world uses, directly or through others.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -41,6 +41,9 @@ impl SceneDesc {
             common.material.into_iter().for_each(|name| self.use_name(name, &mut used));
             common.emission.into_iter().for_each(|emission| self.use_words(emission, &mut used));
             common.opacity.into_iter().for_each(|opacity| self.use_words(opacity, &mut used));
+            if let ShapeDesc::Mesh(MeshDesc { displacement: Some(displacement), .. }) = shape {
+                self.use_name(&displacement.texture, &mut used);
+            }
         }
         self.lights.iter().for_each(|light| self.use_words(light, &mut used));
         used.media.extend(self.medium.clone());
@@ -108,7 +111,7 @@ mod tests {
                 "b": { "type": "product", "factors": [{ "texture": "c" }] },
                 "c": { "type": "checker" }, "d": { "type": "checker" }, "e": { "type": "checker" },
                 "f": { "type": "checker" },
-                "g": { "type": "checker" },
+                "g": { "type": "checker" }, "h": { "type": "checker" },
                 "diffuse": { "type": "checker" }
             },
             "materials": {
@@ -118,7 +121,8 @@ mod tests {
             },
             "lights": [{ "type": "spot", "position": [0, 0, 0], "look_at": [0, 0, 1], "intensity": [1, 1, 1],
             "texture": "g" }],
-            "shapes": [{ "type": "quad", "emission": { "radiance": [1, 1, 1], "texture": "e" } }],
+            "shapes": [{ "type": "quad", "emission": { "radiance": [1, 1, 1], "texture": "e" } },
+                { "type": "mesh", "displacement": { "texture": "h" } }],
             "objects": {
                 "outer": { "instances": [{ "object": "inner" }] },
                 "inner": { "shapes": [{ "type": "sphere", "material": "top", "opacity": { "texture": "f" } }] },
@@ -131,7 +135,7 @@ mod tests {
         let expected = UsedNames {
             objects: names(&["inner", "outer"]),
             materials: names(&["top", "x", "y"]),
-            textures: names(&["a", "b", "c", "e", "f", "g"]),
+            textures: names(&["a", "b", "c", "e", "f", "g", "h"]),
             media: BTreeSet::new(),
         };
         assert_eq!(desc.used_names(), expected);

@@ -49,6 +49,7 @@ pub use revolution::{ProfileParameter, Revolution};
 pub use sector::Sector;
 pub use shape_error::ShapeError;
 pub use sphere::Sphere;
+pub(crate) use tangents::corner_tangents;
 pub use triangle::{TriangleHit, TriangleIntersection, TriangleRay, TriangleSample};
 
 pub(crate) use uv::{interpolated_uv, uv_area, uv_density};

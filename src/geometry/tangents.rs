@@ -58,7 +58,7 @@ impl bevy_mikktspace::Geometry for TangentSpaceInput<'_> {
 }
 
 /// The tangents of all corners; `None` where the algorithm finds none at all.
-pub(super) fn corner_tangents(
+pub(crate) fn corner_tangents(
     positions: &[[f32; 3]],
     normals: Option<&[[f32; 3]]>,
     uvs: &[[f32; 2]],

@@ -7,7 +7,6 @@ mod colors;
 mod curves;
 mod directives;
 mod lights;
-mod loop_subdivision;
 mod materials;
 mod media;
 mod octahedral;

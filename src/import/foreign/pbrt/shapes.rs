@@ -1,26 +1,23 @@
 //! Shapes.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::area_light::{AreaLight, Extent};
 use super::bilinear::Patches;
 use super::colors::Colors;
 use super::curves::curve;
-use super::loop_subdivision;
 use super::media::MediumTable;
 use super::params::Params;
 use super::state::{Ctm, Graphics, ShapeMaterial, World};
 use super::textures::Textures;
 use super::triangles;
 use crate::assets::{MeshData, read_ply_attributes};
-use crate::desc::{
-    CurvesDesc, CylinderDesc, DiskDesc, MaterialDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc, ShapeDesc,
-    SmoothByDesc, SphereDesc,
-};
+use crate::desc::{CurvesDesc, CylinderDesc, DiskDesc, MaterialDesc, MeshDesc, ShapeDesc, SphereDesc};
 use crate::error::Result;
 use crate::import::foreign::Draft;
 use crate::math::{DAffine3, DVec3};
+use crate::subdivision::{Cage, Refinement, Scheme, UvRule, refine, triangle_count};
 
 /// Meshes of more triangles are kept apart from the scene's text.
 const MAX_INLINE: usize = 64;
@@ -182,22 +179,13 @@ impl Shapes<'_> {
                 draft.keep_mesh(&format!("{kind}_{}", draft.assets.meshes.len()), mesh),
             ));
         }
-        let shading = MeshShadingDesc::default();
-        ShapeDesc::Mesh(MeshDesc::new(
-            None,
-            Some(mesh.written_positions()),
-            Some(mesh.triangles),
-            mesh.normals,
-            mesh.uvs,
-            None,
-            BTreeMap::new(),
-            Vec::new(),
-            Vec::new(),
-            shading,
-            None,
-            NormalWeightDesc::default(),
-            SmoothByDesc::default(),
-        ))
+        ShapeDesc::Mesh(MeshDesc {
+            positions: Some(mesh.written_positions()),
+            triangles: Some(mesh.triangles),
+            normals: mesh.normals,
+            uvs: mesh.uvs,
+            ..MeshDesc::empty()
+        })
     }
 
     fn form(&self, draft: &mut Draft, kind: &str, params: &Params, needs: Needs) -> Result<Option<Form>> {
@@ -224,10 +212,11 @@ impl Shapes<'_> {
                 let positions = params.groups("P")?.ok_or_else(|| params.error("needs positions P"))?;
                 let indices =
                     params.indices("indices", positions.len())?.ok_or_else(|| params.error("needs indices"))?;
-                if loop_subdivision::possible_levels(indices.len(), levels) < levels {
+                let (mesh, made) = loop_surface(&positions, &indices, levels);
+                if made < levels {
                     params.approximate("levels", "fewer, for there would be too many triangles");
                 }
-                loop_subdivision::subdivide(&positions, &indices, levels).map_err(|message| params.error(message))?
+                mesh
             }
             other => return Err(params.error(format!("unknown shape \"{other}\""))),
         };
@@ -338,6 +327,34 @@ fn triangle_mesh(params: &Params) -> Result<MeshData> {
         uvs => uvs,
     };
     Ok(MeshData { positions, triangles, normals, uvs, origin, ..MeshData::default() })
+}
+
+/// More triangles than this are not made of a surface.
+const MAX_SUBDIVIDED: u64 = 1 << 20;
+
+/// The limit surface of triangles by Loop's scheme, without triangles that have a vertex twice, and its levels.
+fn loop_surface(positions: &[[f32; 3]], triangles: &[[u32; 3]], levels: u32) -> (MeshData, u32) {
+    let corners: Vec<u32> =
+        triangles.iter().filter(|[a, b, c]| a != b && b != c && c != a).flatten().copied().collect();
+    let cage = Cage {
+        sizes: vec![3; corners.len() / 3],
+        vertices: corners.clone(),
+        points: corners,
+        positions: vec![positions.iter().map(|p| DVec3::from(p.map(f64::from))).collect()],
+        ..Cage::default()
+    };
+    let scheme = Scheme::LoopWarren;
+    let is_possible = |levels: &u32| triangle_count(scheme, 0, triangles.len() as u64, *levels) <= MAX_SUBDIVIDED;
+    let levels = (0..=levels).rev().find(is_possible).unwrap_or(0);
+    let how = Refinement { scheme, uv_rule: UvRule::Linear, levels, is_too_long: None, max_triangles: MAX_SUBDIVIDED };
+    let mut refined = refine(cage, &how);
+    let mesh = MeshData {
+        positions: refined.positions.pop().unwrap_or_default(),
+        triangles: refined.triangles,
+        normals: refined.normals.pop(),
+        ..MeshData::default()
+    };
+    (mesh, levels)
 }
 
 /// The triangles, and how many patches they are.
