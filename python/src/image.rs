@@ -8,9 +8,9 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde_json::Value;
 use steradian::Rendering;
-use steradian::bench::error::flip;
 use steradian::desc::{OutputDesc, PixelTypeDesc, ViewDesc};
 use steradian::film::Image;
+use steradian::output::flip;
 use steradian::output::{self, RenderInfo};
 
 use crate::convert::{from_json, picture};

@@ -77,6 +77,7 @@ mod tests {
     use super::*;
     use crate::accel::AccelKind;
     use crate::bench::Unwatched;
+    use crate::bench::report::Report;
 
     fn options(sweep: &str) -> ScaleOptions {
         ScaleOptions {

@@ -7,6 +7,7 @@ use serde::Serialize;
 use serde_json::Value;
 use steradian::bench::Watch;
 use steradian::bench::error::{Budget, ErrorOptions, External, Standard, Subject, Variant, bench_error};
+use steradian::bench::report::Report;
 use steradian::desc::SceneDesc;
 use steradian::render::{Overrides, Settings};
 use steradian::{Error, Result, compile, output};

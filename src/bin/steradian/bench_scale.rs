@@ -5,6 +5,7 @@ use std::num::NonZero;
 use std::process::Command;
 
 use steradian::bench::Watch;
+use steradian::bench::report::Report;
 use steradian::bench::scale::{Case, ScaleOptions, bench_scale, run_case};
 use steradian::{Error, Result, output};
 
