@@ -172,8 +172,29 @@ mod tests {
             remarks: vec![strange.into()],
         });
         let text = write(&page).unwrap();
-        assert!(text.matches("<script").count() == 1 && text.matches("</title><").count() == 0, "{text}");
-        assert!(!text.contains("\" onload") && !text.contains('\u{1b}'), "{text}");
+        assert!(
+            text.matches("<script").count() == 1 && !text.contains("</title><") && !text.contains('\u{1b}'),
+            "{text}"
+        );
+        // As text, and as values of attributes.
+        let escaped = "&lt;/title&gt;&lt;script&gt;alert(";
+        for place in [
+            "<title>",
+            "<h1>",
+            "<figcaption>",
+            "<th class",
+            "<td class",
+            "<li>",
+            "alt=\"",
+            "aria-label=\"",
+            "class=\"row\"",
+        ] {
+            assert!(text.contains(place), "{place}");
+        }
+        assert!(
+            text.matches(escaped).count() > 12 && !text.contains("alt=\"<") && !text.contains("label=\"<"),
+            "{text}"
+        );
     }
 
     #[test]
