@@ -65,7 +65,7 @@ case "${1:-render}" in
         if [ -x "$loader" ] && "$loader" --help 2>/dev/null | grep 'x86-64-v3 (supported' >/dev/null; then
             export RUSTFLAGS="${RUSTFLAGS:-} -C target-cpu=x86-64-v3"
         fi
-        cargo install --locked --profile dist --path .
+        cargo install --locked --profile dist --path crates/cli
         ;;
     package)
         command -v cargo-deb >/dev/null || cargo install --locked cargo-deb
@@ -78,6 +78,6 @@ case "${1:-render}" in
         for shell in bash:steradian.bash zsh:_steradian fish:steradian.fish; do
             target/release/steradian completions "${shell%%:*}" >"target/completions/${shell#*:}"
         done
-        cargo deb --no-build --locked
+        cargo deb --no-build --locked --package steradian-cli
         ;;
 esac

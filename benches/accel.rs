@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
-use steradian::accel::{self, AccelKind, Accelerator, HitRows};
-use steradian::math::RayRows;
-use steradian::math::rows::BATCH;
+use steradian::internal::accel::{self, AccelKind, Accelerator, HitRows};
+use steradian::internal::math::RayRows;
+use steradian::internal::math::rows::BATCH;
 use steradian_benches::models::{Model, hare, scans};
 use steradian_benches::others::{BvhCrate, ObvhsCrate, Other};
 use steradian_benches::rays::{RaySet, ray_sets};
@@ -68,7 +68,7 @@ fn time(
     group: &mut BenchmarkGroup<WallTime>,
     name: &str,
     set: &RaySet,
-    closest: impl Fn(&steradian::math::Ray) -> bool,
+    closest: impl Fn(&steradian::internal::math::Ray) -> bool,
 ) {
     group.throughput(Throughput::Elements(set.rays.len() as u64));
     group.bench_function(name, |bencher| {

@@ -25,16 +25,12 @@ SAMPLES = (2, 8)
 # In safe code a place that is never reached still has to be tested for.
 NEVER = "unsafe { std::hint::unreachable_unchecked() }"
 
-
-# Not needed to render, beside what the feature `bench` has.
-UNNEEDED = {"bench", "bin"}
-
 # Renders a scene as the command line does and prints a digest of the picture.
 PROGRAM = """//! Renders SCENE with a number of samples, on one thread.
 use std::sync::atomic::AtomicBool;
 
-use steradian::render::{Overrides, Settings, Silent};
-use steradian::{accel, compile, import, render};
+use steradian::internal::render::{Overrides, Settings, Silent};
+use steradian::internal::{accel, compile, import, render};
 
 fn main() -> steradian::Result<()> {
     let words: Vec<String> = std::env::args().collect();
@@ -101,6 +97,10 @@ FEATURES = {
             ("src/geometry/mod.rs", r"Self::Analytic\(placed\) => placed\.interaction_with\(detail, ray, hit\),", "Self::Analytic(_) => " + NEVER + ","),
         ],
     ),
+    "curves and points": (
+        "`Shape::Curves`, `Shape::Points`",
+        [("src/geometry/mod.rs", r"Self::Curves\(_\) \| Self::Points\(_\) => self\.many_interaction_and_dp_dv\(detail, ray, hit\)\.map\(.*\),", "Self::Curves(_) | Self::Points(_) => " + NEVER + ",")],
+    ),
     "instances": (
         "the instance in a hit",
         [
@@ -124,8 +124,8 @@ FEATURES = {
     "layers beside the colour": (
         "`Context::wants_surfaces` and the like, `LayerSet`",
         [
-            ("src/integrator/path/mod.rs", r"self\.config\.needs != SurfaceAovs::default\(\)", "false"),
-            ("src/integrator/path/mod.rs", r"self\.config\.light_aovs\.by_scattering \|\| self\.config\.needs\.features", "false"),
+            ("src/integrator/path/mod.rs", r"self\.config\.surface_aovs != SurfaceAovs::default\(\)", "false"),
+            ("src/integrator/path/mod.rs", r"self\.config\.light_aovs\.by_scattering \|\| self\.config\.surface_aovs\.features", "false"),
             ("src/integrator/path/mod.rs", r"self\.light_aovs\.count\(\) > 0", "false"),
             ("src/film/tile.rs", r"self\.layout\.beside_color\(\)", "false"),
         ],
@@ -150,11 +150,10 @@ def copy_sources(work):
         if not (work / name).exists():
             (shutil.copytree if (ROOT / name).is_dir() else shutil.copy)(ROOT / name, work / name)
     shutil.rmtree(work / "src", ignore_errors=True)
-    shutil.copytree(ROOT / "src", work / "src", ignore=lambda folder, names: UNNEEDED if Path(folder) == ROOT / "src" else set())
+    shutil.copytree(ROOT / "src", work / "src")
     (work / "src/main.rs").write_text(PROGRAM)
     manifest = (ROOT / "Cargo.toml").read_text()
     manifest = re.sub(r"(?ms)^\[(\[bin\]\]|\[test\]\]|workspace\]|dev-dependencies\]|profile[^\n]*\]).*?(?=^\[|\Z)", "", manifest)
-    manifest = manifest.replace('default = ["bench"]', "default = []")
     if not (work / "Cargo.toml").exists() or (work / "Cargo.toml").read_text() != manifest:
         (work / "Cargo.toml").write_text(manifest)
 

@@ -7,11 +7,11 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use steradian::accel::{self, AccelKind, Accelerator};
-use steradian::film::{Image, LayerKind};
-use steradian::render::{self, Overrides, Settings, Silent};
-use steradian::scene::Scene;
-use steradian::{compile, import};
+use steradian::internal::accel::{self, AccelKind, Accelerator};
+use steradian::internal::film::{Image, LayerKind};
+use steradian::internal::render::{self, Overrides, Settings, Silent};
+use steradian::internal::scene::Scene;
+use steradian::internal::{compile, import};
 
 const SIZE: [u32; 2] = [128, 128];
 const SPP: u32 = 4;

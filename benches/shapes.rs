@@ -7,12 +7,12 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use steradian::accel::{self, AccelKind, Accelerator};
-use steradian::geometry::{
+use steradian::internal::accel::{self, AccelKind, Accelerator};
+use steradian::internal::geometry::{
     Analytic, Disk, Frustum, Geometry, Hit, Profile, Quad, Revolution, Shape, Sphere, TransformedShape,
 };
-use steradian::id::{PrimId, ShapeId};
-use steradian::math::{DVec3, Ray, Rng, Transform, Vec3};
+use steradian::internal::id::{PrimId, ShapeId};
+use steradian::internal::math::{DVec3, Ray, Rng, Transform, Vec3};
 use steradian_benches::models::tessellated_sphere;
 
 const RAYS: usize = 16_384;

@@ -12,11 +12,11 @@ use std::path::Path;
 use std::time::Instant;
 use std::{env, fs};
 
-use steradian::accel::{Accelerator, Coherence, EmbreeAccel, HitRows};
-use steradian::geometry::{Geometry, Hit, Mesh, Shape};
-use steradian::id::ShapeId;
-use steradian::math::rows::BATCH;
-use steradian::math::{Ray, RayRows, Vec3};
+use steradian::internal::accel::{Accelerator, Coherence, EmbreeAccel, HitRows};
+use steradian::internal::geometry::{Geometry, Hit, Mesh, Shape};
+use steradian::internal::id::ShapeId;
+use steradian::internal::math::rows::BATCH;
+use steradian::internal::math::{Ray, RayRows, Vec3};
 use steradian_benches::models;
 use steradian_benches::rays::ray_sets;
 

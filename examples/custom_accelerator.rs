@@ -4,15 +4,15 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use steradian::accel::{self, AccelKind, Accelerator};
-use steradian::compile;
-use steradian::geometry::Hit;
-use steradian::import::{self, ImportOptions};
-use steradian::math::{Aabb, Ray};
-use steradian::render::{self, Overrides, Settings, Silent};
+use steradian::internal::accel::{self, AccelKind, Accelerator};
+use steradian::internal::compile;
+use steradian::internal::geometry::Hit;
+use steradian::internal::import::{self, ImportOptions};
+use steradian::internal::math::{Aabb, Ray};
+use steradian::internal::render::{self, Overrides, Settings, Silent};
 
 /// Passes every ray to another accelerator. A new structure implements the same methods over a
-/// [`steradian::geometry::Geometry`]; see [`accel::LinearAccel`] for the shortest one.
+/// [`steradian::internal::geometry::Geometry`]; see [`accel::LinearAccel`] for the shortest one.
 struct Counting<'g> {
     inner: Box<dyn Accelerator + 'g>,
     closest: AtomicU64,

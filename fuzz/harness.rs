@@ -5,12 +5,12 @@ use std::collections::HashSet;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
-use steradian::assets;
-use steradian::assets::MeshData;
-use steradian::config::{self, Trust};
-use steradian::geometry::{CurveBasis, CurveKind, Curves, Strands};
-use steradian::import::{self, ImportOptions};
-use steradian::render::RenderProvenance;
+use steradian::internal::assets;
+use steradian::internal::assets::MeshData;
+use steradian::internal::config::{self, Trust};
+use steradian::internal::geometry::{CurveBasis, CurveKind, Curves, Strands};
+use steradian::internal::import::{self, ImportOptions};
+use steradian::internal::render::RenderProvenance;
 
 /// Reads `data` as a file of `kind`, which is the name of a target, in `folder`, which only this caller writes to.
 /// Malformed files are errors; anything else is a finding.

@@ -21,56 +21,104 @@
 //! | 5 | `scene`, `denoise` |
 //! | 6 | `import`, `integrator`, `compile` |
 //! | 7 | `render`, `convert` |
-//! | 8 | `bench`, `farm`, `live`, `renderer` |
-//! | 9 | `bin/steradian` |
+//! | 8 | `farm`, `live`, `renderer` |
 
-// Checks of numerical stability use parts that a render does not.
-#![cfg_attr(not(feature = "bench"), allow(dead_code, unused_imports))]
-
-pub mod accel;
-pub mod assets;
-pub mod attribute;
-#[cfg(feature = "bench")]
-pub mod bench;
-pub mod bsdf;
+mod accel;
+mod assets;
+mod attribute;
+mod bsdf;
 mod bytes;
-pub mod camera;
-pub mod color;
-pub mod compile;
-pub mod config;
-pub mod convert;
-pub mod denoise;
+mod camera;
+mod color;
+mod compile;
+mod config;
+mod convert;
+mod denoise;
 pub mod desc;
-pub mod error;
-pub mod farm;
-pub mod file;
-pub mod film;
-pub mod geometry;
-pub mod guiding;
-pub mod id;
-pub mod image_data;
-pub mod import;
-pub mod integrator;
-pub mod light;
-pub mod live;
-pub mod material;
-pub mod math;
-pub mod medium;
-pub mod memory;
-pub mod metal;
-pub mod normal_perturbation;
-pub mod opacity;
-pub mod output;
-pub mod printable;
-pub mod render;
+mod error;
+mod farm;
+mod file;
+mod film;
+mod geometry;
+mod guiding;
+mod id;
+mod image_data;
+mod import;
+mod integrator;
+mod light;
+mod live;
+mod material;
+mod math;
+mod medium;
+mod memory;
+mod metal;
+mod normal_perturbation;
+mod opacity;
+mod output;
+mod printable;
+mod render;
 mod renderer;
-pub mod sampling;
-pub mod scene;
-pub mod suggestion;
-pub mod texture;
+mod sampling;
+mod scene;
+mod suggestion;
+mod texture;
 
+pub use accel::{AccelKind, BvhOptions, EmbreeOptions, EmbreeQuality, KdTreeOptions};
+pub use assets::MeshData;
+pub use attribute::AttributeValues;
 pub use error::{Error, ErrorKind, Result};
+pub use film::{Crop, DroppedSample, Image, Layer, LayerInfo, LayerSet};
+pub use import::{ImportOptions, ImportReport, Outcome, ReportEntry};
+pub use integrator::RayCounts;
+pub use render::{ExrOverrides, Overrides, Progress, Settings, Shard, Stats, TrainedGuide};
 pub use renderer::{
     Assignment, LayerView, PreparedRender, Renderer, Rendering, StateOptions, StopHandle, Watch, changed_settings,
     default_outputs, layers_of,
 };
+pub use sampling::SamplerKind;
+
+/// What the packages of this repository need beyond the library's interface: it may change with every version.
+#[doc(hidden)]
+pub mod internal {
+    macro_rules! open {
+        ($($module:ident),* $(,)?) => { $(pub mod $module { pub use crate::$module::*; })* };
+    }
+
+    open!(
+        accel,
+        assets,
+        attribute,
+        bsdf,
+        camera,
+        color,
+        compile,
+        config,
+        convert,
+        denoise,
+        farm,
+        file,
+        film,
+        geometry,
+        guiding,
+        id,
+        image_data,
+        import,
+        integrator,
+        light,
+        live,
+        material,
+        math,
+        medium,
+        memory,
+        metal,
+        normal_perturbation,
+        opacity,
+        output,
+        printable,
+        render,
+        sampling,
+        scene,
+        suggestion,
+        texture,
+    );
+}

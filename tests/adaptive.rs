@@ -1,9 +1,9 @@
 //! Adaptive sampling: pictures reach the target error, are not biased, and take fewer samples.
 
 use serde_json::{Value, json};
-use steradian::accel::{self, AccelKind};
-use steradian::film::{Image, LayerKind};
-use steradian::render::{self, Overrides, RenderResult, Settings, Silent};
+use steradian::internal::accel::{self, AccelKind};
+use steradian::internal::film::{Image, LayerKind};
+use steradian::internal::render::{self, Overrides, RenderResult, Settings, Silent};
 
 use crate::util::render::prepare;
 

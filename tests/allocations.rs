@@ -4,9 +4,9 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use serde_json::{Value, json};
-use steradian::accel::AccelKind;
-use steradian::bench::stability::render::{prepare, render_with};
-use steradian::render::Overrides;
+use steradian::internal::accel::AccelKind;
+use steradian::internal::render::Overrides;
+use steradian_bench::stability::render::{prepare, render_with};
 
 /// The system's allocator.
 struct Counting;

@@ -1,7 +1,8 @@
 //! Files of a scene that are missing or malformed, and those that nothing uses.
 
 use serde_json::{Value, json};
-use steradian::{ErrorKind, import};
+use steradian::ErrorKind;
+use steradian::internal::import;
 
 use crate::bad_input::assert_error;
 use crate::util::folder::{Folder, good_scene};

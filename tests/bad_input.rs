@@ -1,9 +1,10 @@
 //! Every fault of a scene is an error that names the file, the place and the offending word; none is a panic.
 
 use serde_json::{Value, json};
-use steradian::assets::SceneSource;
-use steradian::compile::CheckedScene;
-use steradian::{ErrorKind, import};
+use steradian::ErrorKind;
+use steradian::internal::assets::SceneSource;
+use steradian::internal::compile::CheckedScene;
+use steradian::internal::import;
 
 use crate::util::folder::{Folder, good_scene, set};
 

@@ -60,7 +60,7 @@ fn meshes_with_more_times_than_embree_has() {
     let mut scene = good_scene();
     set(&mut scene, "shapes[0]", mesh(128));
     let scene = Folder::new().compile(&scene).unwrap();
-    steradian::accel::build(steradian::accel::AccelKind::EMBREE, &scene.geometry, 1).unwrap();
+    steradian::internal::accel::build(steradian::internal::accel::AccelKind::EMBREE, &scene.geometry, 1).unwrap();
 }
 
 /// Time and memory of nested products do not grow with the number of ways through them.

@@ -9,7 +9,7 @@ fn bench(arguments: &[&str]) -> Output {
 }
 
 fn scene() -> String {
-    concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell.json").to_owned()
+    concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/cornell.json").to_owned()
 }
 
 #[test]

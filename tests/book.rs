@@ -3,13 +3,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use steradian::{compile, import};
+use steradian::internal::{compile, import};
 
 use crate::util::program::run;
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
+use crate::util::root;
 
 /// The files of a folder and those in it with this extension.
 fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
@@ -62,7 +59,7 @@ fn scenes_of_the_book_compile() {
 fn examples_of_shapes_and_materials_compile() {
     let book = root().join("docs/book");
     let stage = fs::read_to_string(book.join("stage.json")).unwrap();
-    let examples = fs::read_to_string(root().join("src/bin/steradian/manual/examples.txt")).unwrap();
+    let examples = fs::read_to_string(root().join("crates/cli/src/manual/examples.txt")).unwrap();
     let mut count = 0;
     for block in examples.split("\n# ").skip(1) {
         let (head, body) = block.split_once('\n').unwrap();

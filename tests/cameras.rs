@@ -1,7 +1,7 @@
 //! What the cameras of the scene file see.
 
 use serde_json::{Value, json};
-use steradian::film::{Crop, Image, LayerKind};
+use steradian::internal::film::{Crop, Image, LayerKind};
 
 use crate::util::folder::Folder;
 use crate::util::render::{merge, pixels, render};

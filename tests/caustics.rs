@@ -2,11 +2,11 @@
 //! is split.
 
 use serde_json::{Value, json};
-use steradian::accel::AccelKind;
+use steradian::Error;
 use steradian::desc::CausticsDesc;
-use steradian::error::Error;
-use steradian::film::{Image, LayerKind};
-use steradian::render::{self, Overrides};
+use steradian::internal::accel::AccelKind;
+use steradian::internal::film::{Image, LayerKind};
+use steradian::internal::render::{self, Overrides};
 
 use crate::checkpoints::assert_resumed_split_and_replayed;
 use crate::util::render::{assert_blocks_agree, block_means, prepare, render_with};

@@ -5,11 +5,11 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Duration;
 
 use serde_json::{Value, json};
-use steradian::accel::{self, AccelKind};
-use steradian::film::{Film, LayerKind, LayerSet};
-use steradian::import::SceneFingerprint;
-use steradian::math::Rng;
-use steradian::render::{
+use steradian::internal::accel::{self, AccelKind};
+use steradian::internal::film::{Film, LayerKind, LayerSet};
+use steradian::internal::import::SceneFingerprint;
+use steradian::internal::math::Rng;
+use steradian::internal::render::{
     self, Checkpoints, Header, Overrides, Progress, RenderSession, RenderState, Shard, Silent, StateFile,
 };
 
@@ -92,7 +92,7 @@ impl Kit {
 
 /// Every bit of a film.
 pub fn bits(film: &Film) -> Vec<Vec<u8>> {
-    film.tiles().iter().map(steradian::film::FilmTile::save).collect()
+    film.tiles().iter().map(steradian::internal::film::FilmTile::save).collect()
 }
 
 /// Asserts that a render of box-filtered pixels keeps its bits when it is stopped and resumed many times, that three

@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 
 use serde_json::Value;
-use steradian::output;
+use steradian::internal::output;
 
 use crate::util::program::{Running, Signal, run, stderr_of, steradian};
 

@@ -2,14 +2,16 @@
 
 use std::path::Path;
 
-use steradian::accel::AccelKind;
-use steradian::convert::{Originals, write_scene};
-use steradian::import::{ImportOptions, read_scene};
-use steradian::output::FileUses;
-use steradian::render::{Overrides, Settings};
-use steradian::{ErrorKind, compile};
+use steradian::ErrorKind;
+use steradian::internal::accel::AccelKind;
+use steradian::internal::compile;
+use steradian::internal::convert::{Originals, write_scene};
+use steradian::internal::import::{ImportOptions, read_scene};
+use steradian::internal::output::FileUses;
+use steradian::internal::render::{Overrides, Settings};
 
 use crate::util::render::{Prepared, pixels, render_with};
+use crate::util::root;
 
 fn picture(path: &Path) -> Vec<[u32; 3]> {
     let overrides = Overrides { spp: Some(2), size: Some([24, 16]), threads: Some(2), ..Overrides::default() };
@@ -29,7 +31,7 @@ fn convert(path: &Path, target: &Path, originals: Originals) -> steradian::Resul
 fn converted_scenes_give_the_same_picture() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["glassware", "motion", "nee", "shapes", "textures", "tree"] {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).with_extension("json");
+        let path = root().join("scenes").join(name).with_extension("json");
         let expected = picture(&path);
         for (kind, originals) in [("copy", Originals::Copy), ("link", Originals::Link)] {
             let target = folder.path().join(kind).join(format!("{name}.json"));

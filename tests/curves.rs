@@ -2,10 +2,10 @@
 
 use serde_json::{Value, json};
 use steradian::ErrorKind;
-use steradian::accel::{self, AccelKind};
-use steradian::geometry::Shape;
-use steradian::math::Rng;
-use steradian::render::{self, Overrides};
+use steradian::internal::accel::{self, AccelKind};
+use steradian::internal::geometry::Shape;
+use steradian::internal::math::Rng;
+use steradian::internal::render::{self, Overrides};
 
 use crate::bad_input::{assert_error, assert_faults};
 use crate::util::folder::{Folder, good_scene, set};

@@ -1,9 +1,9 @@
 use std::sync::Arc;
 
-use steradian::accel::{AccelKind, Coherence, build};
-use steradian::geometry::{AlphaMask, AlphaMasks, Geometry, Hit, Shape, Sphere, TransformedShape};
-use steradian::id::ShapeId;
-use steradian::math::{DMat3, DVec3, Ray};
+use steradian::internal::accel::{AccelKind, Coherence, build};
+use steradian::internal::geometry::{AlphaMask, AlphaMasks, Geometry, Hit, Shape, Sphere, TransformedShape};
+use steradian::internal::id::ShapeId;
+use steradian::internal::math::{DMat3, DVec3, Ray};
 
 use crate::util::geometry::{
     Rng, cube, grid, ids, instances, meshes, placed_analytic_shapes, ray, ray_through, soup, transform, world,
@@ -126,7 +126,7 @@ fn light_passes_a_veil_as_its_layers_say() {
 #[test]
 fn the_far_side_shows_through_a_hole_of_a_sphere() {
     let sphere = Shape::Analytic(TransformedShape::new(
-        steradian::geometry::Analytic::Sphere(Sphere::full(1.0).unwrap()),
+        steradian::internal::geometry::Analytic::Sphere(Sphere::full(1.0).unwrap()),
         transform(DMat3::IDENTITY, DVec3::new(0.0, 0.0, 5.0)),
     ));
     for geometry in [world(vec![sphere.clone()]), instances(vec![sphere], &[transform(DMat3::IDENTITY, DVec3::ZERO)])] {

@@ -8,9 +8,9 @@ use exr::prelude::{
     WritableImage, f16,
 };
 use serde_json::{Value, json};
-use steradian::denoise::{Denoiser, FEATURE_LAYERS, FileOptions, Report, denoise_file, denoise_image};
-use steradian::film::{Image, Layer, LayerInfo, LayerKind};
-use steradian::output;
+use steradian::internal::denoise::{Denoiser, FEATURE_LAYERS, FileOptions, Report, denoise_file, denoise_image};
+use steradian::internal::film::{Image, Layer, LayerInfo, LayerKind};
+use steradian::internal::output;
 
 use crate::util::render::{merge, render};
 
@@ -179,7 +179,7 @@ fn the_error_of_a_room_halves_and_more_and_groups_still_sum() {
     let denoiser = denoiser(2);
     let kinds: Vec<&str> = LayerInfo::ALL
         .iter()
-        .filter(|info| matches!(info.source, steradian::film::LayerSource::LightAov(_)))
+        .filter(|info| matches!(info.source, steradian::internal::film::LayerSource::LightAov(_)))
         .map(|info| info.name)
         .collect();
     let parts = kinds.len();
@@ -203,8 +203,9 @@ fn the_error_of_a_room_halves_and_more_and_groups_still_sum() {
         assert_eq!(image.layer(kind), noisy.layer(kind));
     }
     let is_group = |layer: &&Layer| layer.kind == LayerKind::LightGroups;
-    let is_part =
-        |layer: &&Layer| matches!(LayerInfo::of(layer.kind).source, steradian::film::LayerSource::LightAov(_));
+    let is_part = |layer: &&Layer| {
+        matches!(LayerInfo::of(layer.kind).source, steradian::internal::film::LayerSource::LightAov(_))
+    };
     let sums =
         [image.layers.iter().filter(is_group).collect::<Vec<_>>(), image.layers.iter().filter(is_part).collect()];
     assert_eq!(sums.each_ref().map(Vec::len), [3, parts]);

@@ -1,8 +1,8 @@
 //! The same picture bit for bit for any number of threads and any crop; every sample can be replayed.
 
 use serde_json::{Value, json};
-use steradian::accel::{self, AccelKind};
-use steradian::render::{self, Overrides};
+use steradian::internal::accel::{self, AccelKind};
+use steradian::internal::render::{self, Overrides};
 
 use crate::util::render::{prepare, render_with};
 

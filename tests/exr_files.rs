@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 use exr::meta::MetaData;
 use exr::prelude::{FlatImage, FlatSamples, ReadChannels, ReadLayers, read};
 use serde_json::Value;
-use steradian::output::{self, cryptomatte};
+use steradian::internal::output::{self, cryptomatte};
 
 /// A red sphere before a quad from a file, lit by a lamp in a group; everything has a name.
 const SCENE: &str = r#"{
@@ -277,7 +277,7 @@ fn checks_have_their_exit_codes() {
     // A picture of others without our attribute is no recipe.
     let plain = output::write_exr(
         &dir.join("plain.exr"),
-        &steradian::film::Image::of_color([1, 1], vec![1.0; 4]),
+        &steradian::internal::film::Image::of_color([1, 1], vec![1.0; 4]),
         &steradian::desc::OutputDesc::new("plain.exr"),
         &output::RenderInfo::default(),
     );

@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use steradian::film::Image;
-use steradian::output;
+use steradian::internal::film::Image;
+use steradian::internal::output;
 
 use crate::util::program::{SCENE, run, stderr_of};
 

@@ -53,7 +53,7 @@ fn statistics_go_to_devices_pipes_and_open_files() {
     );
     assert!(output.status.success(), "{}", stderr_of(&output));
     assert!(is_statistics(&std::fs::read(folder.path().join("b.json")).unwrap()));
-    assert_eq!(steradian::output::read_exr(&folder.path().join("b.exr")).unwrap().size, [24, 16]);
+    assert_eq!(steradian::internal::output::read_exr(&folder.path().join("b.exr")).unwrap().size, [24, 16]);
     for device in ["--json /dev/null", "--log-file /dev/null", "--report /dev/null"] {
         let output = run(folder.path(), &format!("render scene.json -q -o a.exr {device}"));
         assert_eq!(output.status.code(), Some(0), "{}", stderr_of(&output));

@@ -1,7 +1,7 @@
 //! Known flaws of renderers in camera and film. Each test fails on the formula that its name blames.
 
 use serde_json::{Value, json};
-use steradian::film::Image;
+use steradian::internal::film::Image;
 
 use crate::util::render::{pixels, render};
 

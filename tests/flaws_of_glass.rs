@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 
 use serde_json::{Value, json};
-use steradian::film::Image;
-use steradian::geometry::{Analytic, Disk, Frustum, Profile, Revolution, Sphere, TransformedShape};
-use steradian::math::{DMat3, DVec3, Ray, RayF64, Vec3};
+use steradian::internal::film::Image;
+use steradian::internal::geometry::{Analytic, Disk, Frustum, Profile, Revolution, Sphere, TransformedShape};
+use steradian::internal::math::{DMat3, DVec3, Ray, RayF64, Vec3};
 
 use crate::util::geometry::{Rng, all_analytic_shapes, transform};
 use crate::util::render::{pixels, render};
@@ -300,8 +300,9 @@ fn normals_under_an_uneven_scale_stay_perpendicular() {
         let p = ray.origin.as_dvec3() + ray.direction.as_dvec3() * hit.t;
         // The gradient of x²/9 + y² + 4 z².
         let expected = DVec3::new(p.x / 9.0, p.y, 4.0 * p.z).normalize();
-        let at = steradian::geometry::Shape::Analytic(ellipsoid.clone());
-        let found = at.intersect_prim(&ray, steradian::id::ShapeId(0), steradian::id::PrimId(0)).unwrap();
+        let at = steradian::internal::geometry::Shape::Analytic(ellipsoid.clone());
+        let found =
+            at.intersect_prim(&ray, steradian::internal::id::ShapeId(0), steradian::internal::id::PrimId(0)).unwrap();
         let interaction = ellipsoid.interaction(&ray, &found).unwrap();
         assert!((interaction.n_g.as_dvec3() - expected).length() < 1e-6, "{p}: {} {expected}", interaction.n_g);
     }

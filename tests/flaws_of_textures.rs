@@ -2,19 +2,19 @@
 
 use image::{ImageBuffer, Rgb};
 use serde_json::{Value, json};
-use steradian::accel::{self, AccelKind};
-use steradian::bsdf::Bsdf;
-use steradian::color::linear_from_srgb;
 use steradian::desc::ViewDesc;
-use steradian::geometry::SurfaceInteraction;
-use steradian::integrator::World;
-use steradian::math::{Ray, Vec3, vec3};
-use steradian::output;
-use steradian::scene::Scene;
-use steradian::texture::Footprint;
+use steradian::internal::accel::{self, AccelKind};
+use steradian::internal::bsdf::Bsdf;
+use steradian::internal::color::linear_from_srgb;
+use steradian::internal::geometry::SurfaceInteraction;
+use steradian::internal::integrator::World;
+use steradian::internal::math::{Ray, Vec3, vec3};
+use steradian::internal::output;
+use steradian::internal::scene::Scene;
+use steradian::internal::texture::Footprint;
 
 use crate::util::folder::Folder;
-use steradian::math::random::Rng;
+use steradian::internal::math::random::Rng;
 
 /// A scene of shapes with material `m` and a camera that sees the square from -1 to 1.
 fn scene_of(shapes: Value, material: Value) -> Value {

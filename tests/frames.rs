@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 use serde_json::{Value, json};
-use steradian::output;
+use steradian::internal::output;
 
 use crate::util::program::{Running, Signal};
 

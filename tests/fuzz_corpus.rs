@@ -3,6 +3,7 @@
 #[path = "../fuzz/harness.rs"]
 mod harness;
 
+use crate::util::root;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -21,7 +22,7 @@ fn check(kind: &str, bytes: &[u8], folder: &Path, file: &Path) {
 
 #[test]
 fn every_named_file_is_read_or_refused() {
-    let regressions = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/regressions");
+    let regressions = root().join("tests/regressions");
     let folder = tempfile::tempdir().unwrap();
     for kind in KINDS {
         let files: Vec<_> =
@@ -36,7 +37,7 @@ fn every_named_file_is_read_or_refused() {
 /// `fuzz/corpus.tar.gz` has files `corpus/KIND/NAME`.
 #[test]
 fn every_file_of_the_corpus_is_read_or_refused() {
-    let archive = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus.tar.gz");
+    let archive = root().join("fuzz/corpus.tar.gz");
     let folder = tempfile::tempdir().unwrap();
     let mut counts = [0; KINDS.len()];
     for entry in tar::Archive::new(GzDecoder::new(File::open(archive).unwrap())).entries().unwrap() {

@@ -4,19 +4,20 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use steradian::accel::AccelKind;
 use steradian::desc::LayerKind;
-use steradian::film::LayerSet;
-use steradian::render::{Overrides, Settings};
-use steradian::{compile, import};
+use steradian::internal::accel::AccelKind;
+use steradian::internal::film::LayerSet;
+use steradian::internal::render::{Overrides, Settings};
+use steradian::internal::{compile, import};
 
 use crate::util::render::{Prepared, pixels, render_with};
+use crate::util::root;
 
 /// Pictures in the repository stay small.
 const MAX_PICTURE_BYTES: u64 = 100_000;
 
 fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes")
+    root().join("scenes")
 }
 
 /// The names of the files with this extension in a folder, without it.

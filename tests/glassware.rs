@@ -1,18 +1,17 @@
 //! The glasses and bottles of `scenes/glassware.json`: every crossing is found, and what is clear loses no light.
 
-use std::path::Path;
-
 use serde_json::{Value, json};
 use steradian::desc::{ProfileDesc, SceneDesc, ShapeDesc};
-use steradian::geometry::{Profile, Revolution};
-use steradian::import;
-use steradian::math::{DVec2, DVec3, RayF64};
+use steradian::internal::geometry::{Profile, Revolution};
+use steradian::internal::import;
+use steradian::internal::math::{DVec2, DVec3, RayF64};
 
 use crate::util::geometry::Rng;
 use crate::util::render::{Estimate, pixels, render};
+use crate::util::root;
 
 fn scene_file() -> SceneDesc {
-    import::load_scene(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/glassware.json")).unwrap()
+    import::load_scene(&root().join("scenes/glassware.json")).unwrap()
 }
 
 /// The closed profiles, which start and end on the axis, by name.

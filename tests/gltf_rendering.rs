@@ -1,12 +1,12 @@
 //! Renders of glTF files: images upright, normal maps the right way round, holes, sides that give light.
 
 use serde_json::{Value, json};
-use steradian::accel::AccelKind;
-use steradian::compile;
 use steradian::desc::FilterDesc;
-use steradian::film::Image;
-use steradian::import::{ImportOptions, read_scene};
-use steradian::render::{Overrides, Settings};
+use steradian::internal::accel::AccelKind;
+use steradian::internal::compile;
+use steradian::internal::film::Image;
+use steradian::internal::import::{ImportOptions, read_scene};
+use steradian::internal::render::{Overrides, Settings};
 
 use crate::util::folder::Folder;
 use crate::util::render::{Prepared, merge, render_with};

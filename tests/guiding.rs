@@ -3,11 +3,11 @@
 use std::sync::atomic::AtomicBool;
 
 use serde_json::{Value, json};
-use steradian::accel::{self, AccelKind};
-use steradian::error::Error;
-use steradian::film::{Image, LayerKind};
-use steradian::math::Rng;
-use steradian::render::{self, Overrides, RenderResult, RenderState, Shard, Silent, StateFile};
+use steradian::Error;
+use steradian::internal::accel::{self, AccelKind};
+use steradian::internal::film::{Image, LayerKind};
+use steradian::internal::math::Rng;
+use steradian::internal::render::{self, Overrides, RenderResult, RenderState, Shard, Silent, StateFile};
 
 use crate::checkpoints::{self, Kit, StopAfter, bits};
 use crate::util::render::{assert_blocks_agree, block_means, prepare, render_with};

@@ -2,9 +2,9 @@
 
 use serde_json::{Value, json};
 use steradian::ErrorKind;
-use steradian::accel::AccelKind;
-use steradian::assets::{VolumeData, vol_bytes};
-use steradian::render::Overrides;
+use steradian::internal::accel::AccelKind;
+use steradian::internal::assets::{VolumeData, vol_bytes};
+use steradian::internal::render::Overrides;
 
 use crate::bad_input::assert_error;
 use crate::participating_media::{self, assert_means, foggy, hg, integral};

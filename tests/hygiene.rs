@@ -85,15 +85,17 @@ fn messages_are_json_and_go_to_files_by_option() {
 #[test]
 fn colours_are_shown_only_where_they_are_wanted() {
     let folder = tempfile::tempdir().unwrap();
-    let colored = |arguments: &str, variable: Option<(&str, &str)>| {
+    let colored = |arguments: &str, variables: &[(&str, &str)]| {
         let mut command = steradian(folder.path(), arguments);
-        stderr_of(&command.envs(variable).output().unwrap()).contains('\x1b')
+        stderr_of(&command.envs(variables.iter().copied()).output().unwrap()).contains('\x1b')
     };
+    let both = [("NO_COLOR", "1"), ("CLICOLOR_FORCE", "1")];
     for arguments in ["render missing.json", "render --nonsense"] {
-        assert!(!colored(arguments, None), "{arguments}");
-        assert!(colored(&format!("--color always {arguments}"), None), "{arguments}");
-        assert!(colored(arguments, Some(("CLICOLOR_FORCE", "1"))), "{arguments}");
-        assert!(!colored(&format!("{arguments} --color=never"), Some(("CLICOLOR_FORCE", "1"))), "{arguments}");
+        assert!(!colored(arguments, &[]), "{arguments}");
+        assert!(colored(&format!("--color always {arguments}"), &[]), "{arguments}");
+        assert!(colored(arguments, &[("CLICOLOR_FORCE", "1")]), "{arguments}");
+        assert!(!colored(arguments, &both), "{arguments}");
+        assert!(!colored(&format!("{arguments} --color=never"), &[("CLICOLOR_FORCE", "1")]), "{arguments}");
     }
 }
 

@@ -1,9 +1,9 @@
 //! What shapes, materials and instances are called.
 
 use serde_json::{Value, json};
-use steradian::compile;
-use steradian::film::ShapeKey;
-use steradian::scene::Scene;
+use steradian::internal::compile;
+use steradian::internal::film::ShapeKey;
+use steradian::internal::scene::Scene;
 
 use crate::util::folder::Folder;
 

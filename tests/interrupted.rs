@@ -5,8 +5,8 @@ use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::json;
-use steradian::math::Rng;
-use steradian::render::{Header, StateFile};
+use steradian::internal::math::Rng;
+use steradian::internal::render::{Header, StateFile};
 
 use crate::checkpoints::scene;
 use crate::util::program::{Running, Signal};

@@ -2,19 +2,20 @@
 
 use std::f64::consts::PI;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde_json::{Value, json};
-use steradian::accel::AccelKind;
 use steradian::desc::SceneDesc;
-use steradian::film::{Image, Layer, LayerKind, LayerSet};
-use steradian::render::{Overrides, Settings};
-use steradian::{compile, import};
+use steradian::internal::accel::AccelKind;
+use steradian::internal::film::{Image, Layer, LayerKind, LayerSet};
+use steradian::internal::render::{Overrides, Settings};
+use steradian::internal::{compile, import};
 
 use crate::util::folder::set;
 use crate::util::render::{
     AssertIs, Estimate, Prepared, assert_blocks_agree, block_means, merge, prepare, render_with,
 };
+use crate::util::root;
 
 /// The parts of the light by how it came.
 const PARTS: [LayerKind; 10] = [
@@ -84,7 +85,7 @@ pub fn assert_sums(image: &Image, what: &str) {
 }
 
 fn gallery(name: &str) -> (SceneDesc, PathBuf) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).with_extension("json");
+    let path = root().join("scenes").join(name).with_extension("json");
     (import::load_scene(&path).unwrap(), path)
 }
 
@@ -94,7 +95,7 @@ fn small(spp: u32) -> Overrides {
 
 #[test]
 fn parts_and_groups_sum_to_the_picture_in_every_scene() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let folder = root().join("scenes");
     let mut names: Vec<PathBuf> = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     // The mesh of the scan is not part of the repository.
     names.retain(|path| path.extension().is_some_and(|e| e == "json") && !path.ends_with("scan.json"));

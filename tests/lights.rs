@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use serde_json::{Value, json};
 use steradian::ErrorKind;
-use steradian::film::LayerKind;
-use steradian::id::{LightGroupId, LightId};
+use steradian::internal::film::LayerKind;
+use steradian::internal::id::{LightGroupId, LightId};
 
 use crate::util::folder::{Folder, good_scene, set};
 use crate::util::render::{AssertIs, Estimate, assert_irradiance, floor_probe, merge, pixels, probe, render};
@@ -440,8 +440,9 @@ fn a_hidden_lamp_shows_what_is_behind_it() {
                 }))
             };
             let (shown, hidden, beyond) = (picture(false, 0.0), picture(true, 0.0), picture(false, 4.8));
-            let of =
-                |image: &steradian::film::Image, x: u32, y: u32| image.pixel(LayerKind::Color, x, y).unwrap().to_vec();
+            let of = |image: &steradian::internal::film::Image, x: u32, y: u32| {
+                image.pixel(LayerKind::Color, x, y).unwrap().to_vec()
+            };
             assert_eq!((of(&shown, 12, 12)[0] >= 5.0, of(&shown, 12, 12)[3]), (!turned, 1.0), "{kind}");
             assert_eq!(
                 [of(&shown, 0, 0), of(&hidden, 0, 0), of(&beyond, 0, 0)],

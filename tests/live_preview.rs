@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 
 use half::f16;
 use serde_json::{Value, json};
-use steradian::film::{Crop, Image, Layer, LayerKind};
-use steradian::live::{Fan, HttpTimeouts, Live, Options, Preview, PreviewOptions, Snapshot, Statistics};
-use steradian::render::Progress;
+use steradian::internal::film::{Crop, Image, Layer, LayerKind};
+use steradian::internal::live::{Fan, HttpTimeouts, Live, Options, Preview, PreviewOptions, Snapshot, Statistics};
+use steradian::internal::render::Progress;
 
 use crate::util::program::{Running, Signal};
 
@@ -359,7 +359,7 @@ fn a_held_page_shows_the_picture_of_the_file() {
         assert!(start.elapsed() < Duration::from_secs(90));
         thread::sleep(Duration::from_millis(20));
     }
-    let image = steradian::output::read_exr(&folder.path().join("a.exr")).unwrap();
+    let image = steradian::internal::output::read_exr(&folder.path().join("a.exr")).unwrap();
     for (x, y) in [(0, 0), (12, 8), (23, 15)] {
         let pixel = client.get(&format!("/pixel?x={x}&y={y}")).json();
         let values = pixel["layers"][0]["values"].as_array().unwrap();

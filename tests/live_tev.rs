@@ -9,8 +9,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use exr::prelude::{FlatSamples, ReadChannels, ReadLayers};
-use steradian::film::{Crop, Image, Layer, LayerKind};
-use steradian::live::{Snapshot, Tev, TevOptions};
+use steradian::internal::film::{Crop, Image, Layer, LayerKind};
+use steradian::internal::live::{Snapshot, Tev, TevOptions};
 
 const HOUR: Duration = Duration::from_secs(3600);
 

@@ -1,9 +1,9 @@
 //! A tree chooses among many lights: the picture is the same as with any other choice, and the tree stays small.
 
 use serde_json::{Value, json};
-use steradian::accel::AccelKind;
-use steradian::light::{LightSelection, LightSet};
-use steradian::render::Overrides;
+use steradian::internal::accel::AccelKind;
+use steradian::internal::light::{LightSelection, LightSet};
+use steradian::internal::render::Overrides;
 
 use crate::util::geometry::Rng;
 use crate::util::render::{assert_blocks_agree, block_means, prepare, render_with};

@@ -1,6 +1,6 @@
-use steradian::accel::{AccelKind, build};
-use steradian::geometry::{Instance, Mesh, Shape};
-use steradian::math::{DVec3, Ray};
+use steradian::internal::accel::{AccelKind, build};
+use steradian::internal::geometry::{Instance, Mesh, Shape};
+use steradian::internal::math::{DVec3, Ray};
 
 use serde_json::{Value, json};
 
@@ -29,7 +29,7 @@ fn at_each_time_a_moving_scene_is_one_at_rest() {
                 && mesh.is_deforming()
             {
                 let points = (0..mesh.triangles().len()).flat_map(|i| {
-                    let t = mesh.triangle_points_at(steradian::id::PrimId::new(i), time);
+                    let t = mesh.triangle_points_at(steradian::internal::id::PrimId::new(i), time);
                     [t.a, t.b, t.c].map(|p| p.to_array())
                 });
                 let positions: Vec<_> = points.collect();

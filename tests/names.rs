@@ -86,7 +86,7 @@ fn long_names_are_marked_in_files_or_refused() {
             assert_eq!(output.status.code(), Some(0), "{}", stderr_of(&output));
             let bytes = std::fs::read(at("a.exr")).unwrap();
             assert_eq!(bytes[5] & 4 != 0, is_long, "{letters} {profile}");
-            assert_eq!(steradian::output::read_exr(&at("a.exr")).unwrap().size, [24, 16]);
+            assert_eq!(steradian::internal::output::read_exr(&at("a.exr")).unwrap().size, [24, 16]);
         }
     }
     std::fs::write(at("s.json"), grouped(249)).unwrap();

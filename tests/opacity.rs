@@ -4,10 +4,10 @@ use std::f32::consts::{FRAC_1_SQRT_2, PI};
 
 use image::{ImageBuffer, Luma, Rgba};
 use serde_json::{Value, json};
-use steradian::accel::{self, AccelKind};
-use steradian::id::ShapeId;
-use steradian::math::{Ray, Vec3, vec3};
-use steradian::scene::Scene;
+use steradian::internal::accel::{self, AccelKind};
+use steradian::internal::id::ShapeId;
+use steradian::internal::math::{Ray, Vec3, vec3};
+use steradian::internal::scene::Scene;
 
 use crate::util::folder::Folder;
 use crate::util::render::{Estimate, assert_irradiance, floor_probe, merge};

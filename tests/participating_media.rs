@@ -4,9 +4,9 @@ use std::f64::consts::PI;
 
 use serde_json::{Value, json};
 use steradian::ErrorKind;
-use steradian::accel::AccelKind;
-use steradian::film::{Image, LayerKind, LayerSet};
-use steradian::render::Overrides;
+use steradian::internal::accel::AccelKind;
+use steradian::internal::film::{Image, LayerKind, LayerSet};
+use steradian::internal::render::Overrides;
 
 use crate::bad_input::{assert_error, assert_faults};
 use crate::layers::assert_sums;

@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 use steradian::ErrorKind;
-use steradian::accel::{AccelKind, build};
-use steradian::math::{DVec3, Ray};
+use steradian::internal::accel::{AccelKind, build};
+use steradian::internal::math::{DVec3, Ray};
 
 use crate::util::folder::Folder;
 use crate::util::geometry::Rng;

@@ -2,13 +2,13 @@
 
 use image::{ImageBuffer, Luma, Rgb};
 use serde_json::{Value, json};
-use steradian::accel::{self, AccelKind};
-use steradian::bsdf::Bsdf;
-use steradian::geometry::SurfaceInteraction;
-use steradian::integrator::World;
-use steradian::math::{DVec3, Ray, Vec3, vec3};
-use steradian::scene::Scene;
-use steradian::texture::Footprint;
+use steradian::internal::accel::{self, AccelKind};
+use steradian::internal::bsdf::Bsdf;
+use steradian::internal::geometry::SurfaceInteraction;
+use steradian::internal::integrator::World;
+use steradian::internal::math::{DVec3, Ray, Vec3, vec3};
+use steradian::internal::scene::Scene;
+use steradian::internal::texture::Footprint;
 
 use crate::util::folder::Folder;
 use crate::util::geometry::Rng;
@@ -311,7 +311,7 @@ fn lit(shape: Value) -> Value {
 
 /// The largest difference between neighbouring pixels of the inner part of a ball's picture, where `counts` is true of
 /// both.
-fn largest_step(image: &steradian::film::Image, counts: impl Fn(u32, u32) -> bool) -> f32 {
+fn largest_step(image: &steradian::internal::film::Image, counts: impl Fn(u32, u32) -> bool) -> f32 {
     let at = |x: u32, y: u32| image.rgb(x, y).unwrap()[1];
     let inside = |x: u32, y: u32| (x as f32 - 48.0).hypot(y as f32 - 48.0) < 34.0 && counts(x, y);
     let mut largest = 0f32;
@@ -334,7 +334,7 @@ fn a_coarse_smooth_ball_is_shaded_like_a_round_one() {
     let flat = folder.render(&lit(ball(12, "flat")));
     // The outline of the coarse ball lies up to 2 % within the round one of 47 pixels: only where both are is shading
     // compared.
-    let mean = |image: &steradian::film::Image| {
+    let mean = |image: &steradian::internal::film::Image| {
         let inside = |x: u32, y: u32| (x as f32 + 0.5 - 48.0).hypot(y as f32 + 0.5 - 48.0) < 45.0;
         let values = (0..96 * 96)
             .map(|i| (i % 96, i / 96))

@@ -2,11 +2,11 @@
 //! same bits however a render is split.
 
 use serde_json::{Value, json};
-use steradian::accel::AccelKind;
+use steradian::Error;
 use steradian::desc::{IntegratorDesc, RouletteDesc};
-use steradian::error::Error;
-use steradian::film::{Image, LayerKind};
-use steradian::render::{Overrides, Settings};
+use steradian::internal::accel::AccelKind;
+use steradian::internal::film::{Image, LayerKind};
+use steradian::internal::render::{Overrides, Settings};
 
 use crate::checkpoints::assert_resumed_split_and_replayed;
 use crate::util::render::{assert_blocks_agree, block_means, prepare, render_with};

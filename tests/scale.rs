@@ -3,7 +3,7 @@
 
 use serde_json::{Value, json};
 use steradian::ErrorKind;
-use steradian::film::{Image, LayerKind};
+use steradian::internal::film::{Image, LayerKind};
 
 use crate::bad_input::assert_error;
 use crate::util::folder::Folder;

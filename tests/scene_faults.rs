@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use serde_json::json;
-use steradian::{ErrorKind, import};
+use steradian::ErrorKind;
+use steradian::internal::import;
 
 use crate::util::folder::{Folder, good_scene, set};
 

@@ -1,25 +1,25 @@
 //! The content of scene files reaches the compiled scene: schema, transforms, meshes, materials, instances, lights.
 
 use std::os::unix::fs::MetadataExt;
-use std::path::Path;
 
 use image::ImageBuffer;
 use serde_json::{Value, json};
-use steradian::accel::{self, AccelKind};
-use steradian::assets;
-use steradian::bsdf::Bsdf;
-use steradian::compile::Summary;
-use steradian::config::{self, Trust};
-use steradian::geometry::{Mesh, Shape};
-use steradian::id::{PrimId, ShapeId};
-use steradian::import::{self, ImportOptions};
-use steradian::integrator::World;
-use steradian::light::Light;
-use steradian::math::{DVec3, Ray, Vec2, Vec3};
-use steradian::scene::Scene;
-use steradian::texture::Footprint;
+use steradian::internal::accel::{self, AccelKind};
+use steradian::internal::assets;
+use steradian::internal::bsdf::Bsdf;
+use steradian::internal::compile::Summary;
+use steradian::internal::config::{self, Trust};
+use steradian::internal::geometry::{Mesh, Shape};
+use steradian::internal::id::{PrimId, ShapeId};
+use steradian::internal::import::{self, ImportOptions};
+use steradian::internal::integrator::World;
+use steradian::internal::light::Light;
+use steradian::internal::math::{DVec3, Ray, Vec2, Vec3};
+use steradian::internal::scene::Scene;
+use steradian::internal::texture::Footprint;
 
 use crate::util::folder::{Folder, good_scene, set};
+use crate::util::root;
 
 fn lit(shape: Value) -> Value {
     json!({
@@ -382,7 +382,7 @@ fn the_summary_counts_what_is_there() {
 #[test]
 fn a_byte_order_mark_changes_nothing() {
     let folder = Folder::new();
-    let files = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/regressions");
+    let files = root().join("tests/regressions");
     let named = |from: &str| std::fs::read(files.join(from)).unwrap();
     let with = |mark: &str, content: &[u8]| [mark.as_bytes(), content].concat();
     let marks = ["", "\u{feff}"];

@@ -4,9 +4,9 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use steradian::film::{FilmTile, Image, SumPlane};
-use steradian::math::Rng;
-use steradian::render::{self, Overrides, Shard, StateFile};
+use steradian::internal::film::{FilmTile, Image, SumPlane};
+use steradian::internal::math::Rng;
+use steradian::internal::render::{self, Overrides, Shard, StateFile};
 
 use crate::checkpoints::{Kit, scene};
 use crate::interrupted::channels;

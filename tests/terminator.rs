@@ -2,7 +2,7 @@
 //! leaks instead.
 
 use serde_json::{Value, json};
-use steradian::film::Image;
+use steradian::internal::film::Image;
 
 use crate::util::geometry::Rng;
 use crate::util::render::{Estimate, merge, pixels, render};

@@ -117,8 +117,6 @@ mod scale;
 mod scene_faults;
 /// Meshes, comments, names and transforms of scene files, read as users write them.
 mod scene_files;
-/// Rays that leave a surface do not find it again, and do not leak out of closed boxes.
-mod self_intersection;
 /// Renders in parts, put together.
 mod shards;
 /// Shadow as soft on coarse smooth meshes as on the surfaces they approximate, without leaks.

@@ -2,11 +2,11 @@
 
 use image::{ImageBuffer, Luma};
 use serde_json::{Value, json};
-use steradian::accel::{self, AccelKind};
-use steradian::error::ErrorKind;
-use steradian::film::Image;
-use steradian::render::{self, Overrides, Settings};
-use steradian::{compile, import};
+use steradian::ErrorKind;
+use steradian::internal::accel::{self, AccelKind};
+use steradian::internal::film::Image;
+use steradian::internal::render::{self, Overrides, Settings};
+use steradian::internal::{compile, import};
 
 use crate::bad_input::assert_error;
 use crate::util::folder::Folder;

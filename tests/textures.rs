@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use image::{ImageBuffer, Luma, Rgb, Rgba};
 use serde_json::{Value, json};
-use steradian::accel::{self, AccelKind};
-use steradian::geometry::SurfaceInteraction;
-use steradian::integrator::World;
-use steradian::material::{ColorInput, Material, TexturedMaterial};
-use steradian::math::{DVec3, Ray, Vec2, vec2};
-use steradian::scene::Scene;
-use steradian::texture::Texture;
+use steradian::internal::accel::{self, AccelKind};
+use steradian::internal::geometry::SurfaceInteraction;
+use steradian::internal::integrator::World;
+use steradian::internal::material::{ColorInput, Material, TexturedMaterial};
+use steradian::internal::math::{DVec3, Ray, Vec2, vec2};
+use steradian::internal::scene::Scene;
+use steradian::internal::texture::Texture;
 
 use crate::util::folder::Folder;
 use crate::util::render::{merge, pixels};
@@ -35,7 +35,7 @@ fn look(scene: &Scene, origin: DVec3, target: DVec3) -> Option<SurfaceInteractio
 }
 
 /// The colour of the texture on the diffuse shape that a ray meets.
-fn texel(scene: &Scene, at: &SurfaceInteraction) -> steradian::color::Rgb {
+fn texel(scene: &Scene, at: &SurfaceInteraction) -> steradian::internal::color::Rgb {
     let Material::Textured(varying, _) = scene.material(at.shape) else { panic!("constant") };
     match &**varying {
         TexturedMaterial::Diffuse { albedo: ColorInput::Texture(id), .. } => scene.textures[id.index()].color(at.uv),
@@ -106,7 +106,7 @@ fn textures_stay_on_shapes_that_are_moved() {
         let at_rest = folder.compile(&scene_of(json!([shape]), json!({}))).unwrap();
         let moved = folder.compile(&scene_of(json!([moved_shape]), json!({}))).unwrap();
         let placed = match &moved.geometry.shapes[0] {
-            steradian::geometry::Shape::Analytic(placed) => placed.transform,
+            steradian::internal::geometry::Shape::Analytic(placed) => placed.transform,
             _ => panic!("analytic shapes only"),
         };
         for (u, v) in [(0.1, 0.3), (0.4, 0.7), (0.8, 0.2)] {
@@ -123,7 +123,7 @@ fn textures_stay_on_shapes_that_are_moved() {
 #[test]
 fn a_textured_mesh_is_the_same_on_any_number_of_threads() {
     use crate::util::render::{prepare, render_with};
-    use steradian::render::Overrides;
+    use steradian::internal::render::Overrides;
     let mesh = json!([{
         "type": "mesh", "material": "m", "positions": [[-1, -1, 0], [1, -1, 0], [1, 1, 0.5], [-1, 1, 0]],
         "triangles": [[0, 1, 2], [0, 2, 3]],

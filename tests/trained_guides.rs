@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use serde_json::json;
-use steradian::film::LayerKind;
-use steradian::output::read_exr;
+use steradian::internal::film::LayerKind;
+use steradian::internal::output::read_exr;
 
 use crate::guiding::room_with_shaft;
 use crate::util::program::{run, stderr_of};

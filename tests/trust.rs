@@ -7,8 +7,8 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 use steradian::desc::OutputDesc;
-use steradian::film::Image;
-use steradian::output::{self, RenderInfo};
+use steradian::internal::film::Image;
+use steradian::internal::output::{self, RenderInfo};
 
 use crate::util::program::{SCENE, run, stderr_of};
 

@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 use steradian::ErrorKind;
-use steradian::color::linear_from_srgb;
-use steradian::math::Vec3;
+use steradian::internal::color::linear_from_srgb;
+use steradian::internal::math::Vec3;
 
 use crate::bad_input::assert_error;
 use crate::util::folder::{Folder, good_scene, set};

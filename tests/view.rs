@@ -5,9 +5,9 @@ use std::process::{Command, Output, Stdio};
 use half::f16;
 use serde_json::{Value, json};
 use steradian::desc::{LayerKind, OutputDesc, PixelTypeDesc};
-use steradian::film::{Image, Layer};
-use steradian::output::flip::hdr_flip;
-use steradian::output::{RenderInfo, write_exr};
+use steradian::internal::film::{Image, Layer};
+use steradian::internal::output::flip::hdr_flip;
+use steradian::internal::output::{RenderInfo, write_exr};
 
 use crate::live_preview::{Client, address};
 use crate::util::folder::Folder;

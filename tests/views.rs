@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use serde_json::json;
-use steradian::color::srgb_from_linear;
-use steradian::film::LayerKind;
-use steradian::output::read_exr;
+use steradian::internal::color::srgb_from_linear;
+use steradian::internal::film::LayerKind;
+use steradian::internal::output::read_exr;
 
 use crate::util::program::{run, stderr_of};
 

@@ -3,10 +3,10 @@
 use std::f32::consts::TAU;
 use std::path::PathBuf;
 
-use steradian::assets::read_ply;
-use steradian::geometry::{Geometry, Mesh, Shape};
-use steradian::id::ShapeId;
-use steradian::math::{Aabb, Vec3};
+use steradian::internal::assets::read_ply;
+use steradian::internal::geometry::{Geometry, Mesh, Shape};
+use steradian::internal::id::ShapeId;
+use steradian::internal::math::{Aabb, Vec3};
 
 /// A mesh with its floor, and what of it a camera should frame.
 pub struct Model {

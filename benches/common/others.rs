@@ -7,8 +7,8 @@ use bvh::bounding_hierarchy::{BHShape, BoundingHierarchy};
 use nalgebra::{Point3, Vector3};
 use obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris};
 use obvhs::ray::RayHit;
-use steradian::geometry::Mesh;
-use steradian::math::Ray;
+use steradian::internal::geometry::Mesh;
+use steradian::internal::math::Ray;
 
 /// Traces the rays of the benchmarks.
 pub trait Other {

@@ -1,8 +1,8 @@
 //! Rays as a path tracer sends them: from a camera, one diffuse bounce on, and from there to a light.
 
-use steradian::accel::{Accelerator, Coherence};
-use steradian::geometry::SpawnPoint;
-use steradian::math::{Ray, Rng, Vec3};
+use steradian::internal::accel::{Accelerator, Coherence};
+use steradian::internal::geometry::SpawnPoint;
+use steradian::internal::math::{Ray, Rng, Vec3};
 
 use super::models::Model;
 
@@ -29,8 +29,8 @@ pub fn ray_sets(model: &Model, accel: &dyn Accelerator, resolution: usize) -> Ve
         let n = if si.n_g.dot(ray.direction) < 0.0 { si.n_g } else { -si.n_g };
         bounce.push(si.spawn(random.cosine_around(n.as_dvec3()).as_vec3()));
         // A light of a tenth of the model's size, above and beside it.
-        let on_light =
-            center + size * steradian::math::DVec3::new(0.8 + 0.1 * random.unit(), 1.5, 0.5 + 0.1 * random.unit());
+        let on_light = center
+            + size * steradian::internal::math::DVec3::new(0.8 + 0.1 * random.unit(), 1.5, 0.5 + 0.1 * random.unit());
         shadow.push(si.spawn_to(&SpawnPoint { p: on_light, n: Vec3::ZERO, error: 0.0 }));
     }
     vec![

@@ -23,7 +23,7 @@ STAGE = json.loads((BOOK / "stage.json").read_text())
 
 
 def examples():
-    text = (ROOT / "src/bin/steradian/manual/examples.txt").read_text()
+    text = (ROOT / "crates/cli/src/manual/examples.txt").read_text()
     for block in text.split("\n# ")[1:]:
         head, body = block.split("\n", 1)
         kind, _, name = head.strip().partition("Desc ")

@@ -4,7 +4,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyBytes, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use serde_json::{Map, Number, Value};
-use steradian::assets::MeshData;
+use steradian::internal::assets::MeshData;
 
 /// Keys of a mesh that may be arrays.
 const BUFFERS: [&str; 5] = ["positions", "triangles", "normals", "uvs", "colors"];

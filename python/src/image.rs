@@ -9,9 +9,9 @@ use pyo3::types::{PyBytes, PyDict};
 use serde_json::Value;
 use steradian::Rendering;
 use steradian::desc::{OutputDesc, PixelTypeDesc, ViewDesc};
-use steradian::film::Image;
-use steradian::output::flip;
-use steradian::output::{self, RenderInfo};
+use steradian::internal::film::Image;
+use steradian::internal::output::flip;
+use steradian::internal::output::{self, RenderInfo};
 
 use crate::convert::{from_json, picture};
 use crate::errors::OrRaise;

@@ -6,8 +6,8 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::{Map, Value};
-use steradian::import::{self, ImportOptions};
-use steradian::render::Overrides;
+use steradian::internal::import::{self, ImportOptions};
+use steradian::internal::render::Overrides;
 use steradian::{Assignment, Renderer};
 
 use crate::convert::{Meshes, from_json, to_json};

@@ -12,9 +12,8 @@ mod rows;
 mod tree;
 
 pub use bvh::BvhOptions;
-#[cfg(feature = "bench")]
 pub use embree::EmbreeReplay;
-pub(crate) use embree::Registered;
+pub use embree::Registered;
 pub use embree::{EmbreeAccel, EmbreeInfo, EmbreeOptions, EmbreeQuality, on_uncaught_exception};
 pub use kdtree::KdTreeOptions;
 pub use kind::{AccelKind, UnknownAccel, build};

@@ -17,7 +17,7 @@ pub struct MeshData {
     pub normals: Option<Vec<[f32; 3]>>,
     /// A uv for each vertex, with the origin at the bottom left.
     pub uvs: Option<Vec<[f32; 2]>>,
-    /// Values for each vertex or each triangle, by [name](crate::attribute); colours of vertices are [`VERTEX_COLOR`].
+    /// Values for each vertex or each triangle, by name; colours of vertices are [`VERTEX_COLOR`].
     pub attributes: BTreeMap<String, AttributeValues>,
     /// What all positions are relative to: zero, unless they were given so far away that `f32` would spoil them.
     pub origin: [f64; 3],
@@ -59,6 +59,7 @@ impl MeshData {
 
     /// The position of a vertex.
     #[inline]
+    #[doc(hidden)]
     pub fn position(&self, relative: [f32; 3]) -> DVec3 {
         DVec3::from(relative.map(f64::from)) + DVec3::from(self.origin)
     }
@@ -72,6 +73,7 @@ impl MeshData {
     }
 
     /// Bounds of the vertices, those of NaN left out.
+    #[doc(hidden)]
     pub fn bounds(&self) -> Bounds {
         self.positions.iter().fold(Bounds::EMPTY, |b, &p| b.extended(self.position(p)))
     }

@@ -35,7 +35,6 @@ pub use coat::{Coat, diffuse_mean, mitsuba_diffuse_mean};
 pub use coated::{Coated, PooledCoated};
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;
-#[cfg(feature = "bench")]
 pub use energy::bake as bake_energy_tables;
 pub use eon::Eon;
 pub use flags::BsdfFlags;

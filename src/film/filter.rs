@@ -94,10 +94,10 @@ enum Kernel {
 
 impl Filter {
     /// Every kind of filter, with usual parameters and others, to be checked.
-    pub(crate) const EXAMPLES: [FilterDesc; 10] = Self::examples(FilterSamplesDesc::Importance);
+    pub const EXAMPLES: [FilterDesc; 10] = Self::examples(FilterSamplesDesc::Importance);
 
     /// [`EXAMPLES`](Self::EXAMPLES), applied in this way.
-    pub(crate) const fn examples(samples: FilterSamplesDesc) -> [FilterDesc; 10] {
+    pub const fn examples(samples: FilterSamplesDesc) -> [FilterDesc; 10] {
         let samples = Some(samples);
         [
             FilterDesc::Box { radius: 0.5, samples },

@@ -132,6 +132,7 @@ pub struct Image {
     /// The layers; the first is [`LayerKind::Color`].
     pub layers: Vec<Layer>,
     /// Which shapes each pixel shows, if layers need it.
+    #[doc(hidden)]
     pub coverage: Option<Coverage>,
 }
 

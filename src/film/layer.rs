@@ -114,6 +114,7 @@ pub struct LayerInfo {
     /// Its description in the file's comment.
     pub comment: &'static str,
     /// Where its numbers come from.
+    #[doc(hidden)]
     pub source: LayerSource,
 }
 
@@ -353,6 +354,7 @@ impl LayerSet {
     }
 
     /// The layers of first surfaces that are filtered so, in the table's order.
+    #[doc(hidden)]
     pub fn surfaces(self, filtering: Filtering) -> impl Iterator<Item = &'static LayerInfo> {
         self.iter().filter(move |info| matches!(info.source, LayerSource::Surface(_, other) if other == filtering))
     }

@@ -30,7 +30,7 @@ pub use path::PathIntegrator;
 pub use regularization::Regularization;
 pub use render_context::RenderContext;
 pub use roulette::{Continuation, ContinuationGrid, Roulette};
-pub(crate) use shading::{adapt_shading_normal, terminator_factor};
+pub use shading::{adapt_shading_normal, terminator_factor};
 pub use strategy::Strategy;
 pub use surface::SurfaceAovs;
 pub use whitted::Whitted;

@@ -115,11 +115,13 @@ pub struct PreparedRender {
 
 impl PreparedRender {
     /// The compiled scene.
+    #[doc(hidden)]
     pub fn scene(&self) -> &Scene {
         &self.loaded.scene
     }
 
     /// The accelerator.
+    #[doc(hidden)]
     pub fn accel(&self) -> &dyn Accelerator {
         self.loaded.accel()
     }
@@ -138,6 +140,7 @@ impl PreparedRender {
     ///
     /// # Errors
     /// [`Error::Setting`](crate::Error::Setting) if the pixel lies outside the picture.
+    #[doc(hidden)]
     pub fn replay(&self, pixel: [u32; 2], sample: u32) -> Result<Replayed> {
         let settings = Settings { layers: LayerSet::FULL, ..self.job.settings.clone() };
         replay(&self.loaded.scene, self.loaded.accel(), &settings, pixel, sample)

@@ -147,6 +147,7 @@ impl Renderer {
     }
 
     /// A scene that was read from `scene_file`.
+    #[doc(hidden)]
     pub fn from_imported(imported: Imported, scene_file: impl Into<PathBuf>) -> Self {
         let scene_file = scene_file.into();
         let overrides = Overrides { default_outputs: default_outputs(&scene_file), ..Overrides::default() };
@@ -179,6 +180,7 @@ impl Renderer {
     }
 
     /// The scene as it was read, with its assets.
+    #[doc(hidden)]
     pub fn imported(&self) -> &Imported {
         &self.imported
     }
@@ -217,6 +219,7 @@ impl Renderer {
     ///
     /// # Errors
     /// [`Error::Missing`] if a file of the scene cannot be read.
+    #[doc(hidden)]
     pub fn recipe(&mut self, settings: &Settings) -> Result<Option<RenderProvenance>> {
         let is_exr = |file: &str| Format::from_path(Path::new(file)).is_ok_and(|format| format == Format::Exr);
         if self.recipe.is_some() {
@@ -281,6 +284,7 @@ impl Renderer {
     ///
     /// # Errors
     /// As [`load`](Self::load); [`Error::Setting`] if the pixel lies outside the picture.
+    #[doc(hidden)]
     pub fn replay(&mut self, pixel: [u32; 2], sample: u32) -> Result<Replayed> {
         let mut settings = self.settings()?;
         if let Some(options) = &self.denoise {

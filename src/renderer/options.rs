@@ -233,6 +233,7 @@ impl Renderer {
 
     /// Files keep this of how the picture is made.
     #[must_use]
+    #[doc(hidden)]
     pub fn with_recipe(mut self, recipe: Option<RenderProvenance>) -> Self {
         self.fingerprint = recipe.as_ref().map(|recipe| recipe.scene.clone());
         self.recipe = recipe;
@@ -241,6 +242,7 @@ impl Renderer {
 
     /// The time of loading counts from this moment.
     #[must_use]
+    #[doc(hidden)]
     pub fn started_at(mut self, start: Instant) -> Self {
         self.start = start;
         self

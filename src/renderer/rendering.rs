@@ -89,6 +89,7 @@ impl Rendering {
     }
 
     /// The metadata of files.
+    #[doc(hidden)]
     pub fn info(&self) -> &RenderInfo {
         &self.info
     }
@@ -104,6 +105,7 @@ impl Rendering {
     }
 
     /// What denoising did, if the picture is denoised.
+    #[doc(hidden)]
     pub fn denoised(&self) -> Option<&Report> {
         self.denoised.as_ref().map(|denoised| &denoised.report)
     }

@@ -5,7 +5,8 @@ mod discrete;
 mod mis;
 mod piecewise;
 mod sampler;
-#[cfg(feature = "bench")]
+#[cfg(test)]
+#[path = "../../crates/bench/src/stability/statistics.rs"]
 pub mod statistics;
 pub mod warp;
 

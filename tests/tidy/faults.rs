@@ -73,7 +73,7 @@ fn unsafe_code_away_from_home_or_without_a_reason_is_found() {
 #[test]
 fn printing_opening_and_tolerances_are_found() {
     assert_finds(printing, "src/film/tile.rs", "fn f() { println!(\"\") }", &["println!"]);
-    assert_accepts(printing, "src/bin/steradian/main.rs", "fn f() { println!(\"\") }");
+    assert_accepts(printing, "crates/cli/src/main.rs", "fn f() { println!(\"\") }");
     assert_finds(opening, "src/film/tile.rs", "fn f() { File::open(\"a\") }", &["File::open("]);
     assert_accepts(opening, "src/file/input.rs", "fn f() { File::open(\"a\") }");
     assert_finds(tolerances, "src/film/tile.rs", "ray.t_min = 1e-4;", &["t_min = 1e-4"]);

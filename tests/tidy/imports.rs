@@ -57,7 +57,7 @@ pub fn upward_imports(sources: &[Source]) -> Vec<String> {
     let mut faults = Vec::new();
     for source in sources {
         let module = source.module();
-        if source.path.starts_with("src/bin/") || module == "lib" {
+        if module == "lib" {
             continue;
         }
         let Some(own) = layer(module) else {
@@ -65,7 +65,7 @@ pub fn upward_imports(sources: &[Source]) -> Vec<String> {
             continue;
         };
         for target in imported_modules(source).iter().filter(|target| *target != module) {
-            // The crate root re-exports only the error type.
+            // Of what the crate root re-exports, modules import only the error type from there.
             let target = if ["Error", "ErrorKind", "Result"].contains(&target.as_str()) { "error" } else { target };
             let allowed = layer(target).is_some_and(|l| l < own);
             let narrow = NARROW.iter().find(|(m, _)| *m == module).is_none_or(|(_, list)| list.contains(&target));

@@ -1,11 +1,11 @@
 //! Help, errors and documents are in the field's plain English: phrases that are not.
 
 use std::fs;
-use std::path::Path;
 
 use proc_macro2::{TokenStream, TokenTree};
 
-use super::{Source, assert_holds, sources};
+use super::{PRODUCT, Source, assert_holds, sources};
+use crate::util::root;
 
 /// Phrases that neither messages, nor help, nor the manual of the scene format, nor documents have.
 const BANNED: &[&str] = &[
@@ -46,19 +46,19 @@ const BANNED: &[&str] = &[
 const BANNED_BEGINNINGS: &[&str] = &["there is no ", "there are no "];
 
 /// Sources whose comments users read: help of the command line, and the manual of the scene format.
-const MANUALS: [&str; 2] = ["src/bin/steradian/args/", "src/desc/"];
+const MANUALS: [&str; 2] = ["crates/cli/src/args/", "src/desc/"];
 
 /// Documents for users.
 const DOCUMENTS: [&str; 4] = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md"];
 
 #[test]
 fn messages_and_help_are_in_plain_words() {
-    assert_holds(phrases, &["src"]);
+    assert_holds(phrases, PRODUCT);
 }
 
 #[test]
 fn documents_are_in_plain_words() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = root();
     let folders = ["docs", "docs/book/src"].map(|folder| fs::read_dir(root.join(folder)).unwrap());
     let docs = folders.into_iter().flatten().map(|entry| entry.unwrap().path());
     let documents = docs.chain(DOCUMENTS.map(|name| root.join(name))).filter(|path| path.extension().is_some());
@@ -127,7 +127,7 @@ fn banned_phrases_are_found_in_messages_help_and_manuals() {
     assert_eq!(count("src/a.rs", "fn f() { g(\"Whom it is for\") }"), 1);
     assert_eq!(count("src/a.rs", "/// What finds hits.\nfn f() {}"), 0);
     assert_eq!(count("src/desc/a.rs", "/// What finds hits.\nfn f() {}"), 1);
-    assert_eq!(count("src/bin/steradian/args/a.rs", "struct A { /// Whom it is for\n a: u8 }"), 1);
+    assert_eq!(count("crates/cli/src/args/a.rs", "struct A { /// Whom it is for\n a: u8 }"), 1);
     assert_eq!(count("src/a.rs", "fn f() { g(\"no file {a}\") }"), 0);
-    assert!(sources(&["src"]).len() > 300);
+    assert!(sources(PRODUCT).len() > 300);
 }

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
-use steradian::accel::AccelKind;
-use steradian::error::Result;
-use steradian::film::Image;
-use steradian::render::{Overrides, Settings};
-use steradian::scene::Scene;
-use steradian::{compile, import};
+use steradian::Result;
+use steradian::internal::accel::AccelKind;
+use steradian::internal::film::Image;
+use steradian::internal::render::{Overrides, Settings};
+use steradian::internal::scene::Scene;
+use steradian::internal::{compile, import};
 
 use super::render::{Prepared, render_with};
 

@@ -1,7 +1,7 @@
 //! Scenes written as JSON values, rendered and judged.
 
 use serde_json::{Value, json};
-pub use steradian::bench::stability::render::*;
+pub use steradian_bench::stability::render::*;
 
 /// What an estimate is held to.
 pub trait AssertIs {

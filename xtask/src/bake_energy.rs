@@ -7,5 +7,5 @@ use crate::{Outcome, root};
 
 pub fn run() -> Outcome {
     let file = root().join("src/bsdf/energy/tables.bin");
-    Ok(std::fs::write(file, steradian::bsdf::bake_energy_tables())?)
+    Ok(std::fs::write(file, steradian::internal::bsdf::bake_energy_tables())?)
 }

@@ -8,7 +8,7 @@ use std::f32::consts::{PI, TAU};
 use std::fs;
 
 use glam::{Vec3 as V, vec3};
-use steradian::assets::read_ply;
+use steradian::internal::assets::read_ply;
 
 use crate::make_meshes::{Mesh, grid, knot, ply};
 use crate::{Outcome, root};

@@ -17,11 +17,12 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use steradian::accel::{self, AccelKind};
-use steradian::film::Image;
-use steradian::import::{self, ImportOptions};
-use steradian::render::{self, Overrides, Settings, Silent};
-use steradian::{Error, Result, compile, output};
+use steradian::internal::accel::{self, AccelKind};
+use steradian::internal::film::Image;
+use steradian::internal::import::{self, ImportOptions};
+use steradian::internal::render::{self, Overrides, Settings, Silent};
+use steradian::internal::{compile, output};
+use steradian::{Error, Result};
 
 use crate::{Outcome, root};
 

@@ -8,10 +8,11 @@ use std::path::Path;
 
 use serde::Deserialize;
 use serde_json::{Value, json};
-use steradian::id::ShapeId;
-use steradian::math::{Vec2, Vec3};
-use steradian::texture::Footprint;
-use steradian::{Result, compile, import};
+use steradian::Result;
+use steradian::internal::id::ShapeId;
+use steradian::internal::math::{Vec2, Vec3};
+use steradian::internal::texture::Footprint;
+use steradian::internal::{compile, import};
 
 use crate::Outcome;
 

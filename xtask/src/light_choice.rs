@@ -9,11 +9,12 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use steradian::accel::{self, AccelKind};
-use steradian::film::Image;
-use steradian::light::{LightSelection, LightSet};
-use steradian::render::{self, Overrides, Settings, Silent};
-use steradian::{Error, Result, compile, import};
+use steradian::internal::accel::{self, AccelKind};
+use steradian::internal::film::Image;
+use steradian::internal::light::{LightSelection, LightSet};
+use steradian::internal::render::{self, Overrides, Settings, Silent};
+use steradian::internal::{compile, import};
+use steradian::{Error, Result};
 
 use crate::{Outcome, root};
 

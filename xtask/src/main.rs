@@ -4,6 +4,7 @@ use std::error::Error;
 use std::path::Path;
 use std::process::ExitCode;
 
+mod api;
 mod bake_energy;
 mod bench_scenes;
 mod compare_refs;
@@ -20,6 +21,7 @@ type Outcome = Result<(), Box<dyn Error>>;
 const USAGE: &str = "\
 usage: cargo xtask NAME [ARGUMENT...]
 
+  api                  the library's public interface: api.txt; with --check, whether that is up to date
   bake_energy          tables of microfacet albedos: src/bsdf/energy/tables.bin
   bench_scenes         meshes of benches/scenes
   compare_refs         compare renders with reference images: REFS [--spp N] [SCENE...]
@@ -27,7 +29,7 @@ usage: cargo xtask NAME [ARGUMENT...]
   light_choice         compare light tree and power sampling at equal time: [SCENE.json] [--spp N] [--rounds N]
   make_meshes          meshes and sky of scenes/, and scenes/shrine.json
   make_textures        textures of scenes/
-  make_vectors         exact test vectors of shapes: src/bench/stability/vectors
+  make_vectors         exact test vectors of shapes: crates/bench/src/stability/vectors
   mutants              inject faults, check that tests find them: [NAME...]
   texture_filtering    error and time of texture lookups
 ";
@@ -42,6 +44,7 @@ fn main() -> ExitCode {
     let name = words.next().unwrap_or_default();
     let words: Vec<String> = words.collect();
     let outcome = match name.as_str() {
+        "api" => api::run(&words),
         "bake_energy" => bake_energy::run(),
         "bench_scenes" => bench_scenes::run(),
         "compare_refs" => compare_refs::run(words),

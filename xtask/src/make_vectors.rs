@@ -1,4 +1,4 @@
-//! Writes `src/bench/stability/vectors`: rays at shapes with their exact hits, found in arithmetic of 256 bits.
+//! Writes `crates/bench/src/stability/vectors`: rays at shapes with their exact hits, found in arithmetic of 256 bits.
 //!
 //! A line of a quadric's or a flat shape's file, all numbers as the hexadecimal bits of their floats: origin and
 //! direction (`f32`), the shape's translation (`f64`), and of a hit the distance and the point, rounded to `f64`, and
@@ -10,9 +10,9 @@ use std::fmt::Write as _;
 
 use dashu_float::FBig;
 use dashu_float::round::mode::HalfEven;
-use steradian::bench::stability::oracle::{Case, whole_cases};
-use steradian::geometry::{Profile, Revolution};
-use steradian::math::{DVec3, Ray, Rng, Vec3};
+use steradian::internal::geometry::{Profile, Revolution};
+use steradian::internal::math::{DVec3, Ray, Rng, Vec3};
+use steradian_bench::stability::oracle::{Case, whole_cases};
 
 use crate::{Outcome, root};
 
@@ -303,7 +303,7 @@ fn revolution_file(points: &[[f64; 2]], seed: u64) -> String {
 }
 
 pub fn run() -> Outcome {
-    let folder = root().join("src/bench/stability/vectors");
+    let folder = root().join("crates/bench/src/stability/vectors");
     for (i, case) in whole_cases().iter().enumerate() {
         std::fs::write(folder.join(format!("{}.txt", case.name)), quadric_file(case, i as u64))?;
     }

@@ -31,7 +31,7 @@ struct Mutant {
     old: String,
     /// What takes its place.
     new: String,
-    /// Paths of tests of the library, or of `tests/` if they begin with `tests::`; each must fail.
+    /// Paths of tests of the libraries, or of `tests/` if they begin with `tests::`; each must fail.
     tests: Vec<String>,
 }
 
@@ -148,7 +148,7 @@ fn copy_tree(root: &Path, tree: &Path) -> Result<()> {
     for name in ["Cargo.toml", "Cargo.lock", "build.rs", "README.md", "fuzz/harness.rs", "fuzz/corpus.tar.gz"] {
         copy_if_changed(&root.join(name), &tree.join(name))?;
     }
-    for folder in ["src", "tests", "benches", "examples", "scenes", "docs", "ffi", "xtask"] {
+    for folder in ["src", "crates", "tests", "benches", "examples", "scenes", "docs", "ffi", "python", "xtask"] {
         let mut folders: Vec<PathBuf> = vec![folder.into()];
         while let Some(folder) = folders.pop() {
             for entry in fs::read_dir(root.join(&folder))? {

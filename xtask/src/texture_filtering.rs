@@ -18,10 +18,10 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
 
-use steradian::image_data::{ImageData, Samples};
-use steradian::math::{Vec2, vec2};
-use steradian::sampling::{Sampler, SamplerKind};
-use steradian::texture::{Bitmap, Decoding, Footprint, TextureImage};
+use steradian::internal::image_data::{ImageData, Samples};
+use steradian::internal::math::{Vec2, vec2};
+use steradian::internal::sampling::{Sampler, SamplerKind};
+use steradian::internal::texture::{Bitmap, Decoding, Footprint, TextureImage};
 
 const WIDTH: u32 = 96;
 const HEIGHT: u32 = 64;

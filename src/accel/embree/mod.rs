@@ -8,13 +8,11 @@ mod callbacks;
 mod device;
 mod gate;
 mod packet;
-#[cfg(feature = "bench")]
 mod replay;
 mod scene;
 mod sys;
 
 pub use device::EmbreeInfo;
-#[cfg(feature = "bench")]
 pub use replay::EmbreeReplay;
 
 use std::ffi::c_char;
@@ -70,7 +68,7 @@ impl Default for EmbreeOptions {
 
 /// What a scene makes Embree call back for, or keep beside triangles at rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Registered {
+pub struct Registered {
     /// Meshes with a filter for holes or slivers.
     pub filters: usize,
     /// Analytic shapes.
@@ -125,7 +123,7 @@ impl<'g> EmbreeAccel<'g> {
     }
 
     /// What Embree calls back for, or keeps beside triangles at rest.
-    pub(crate) fn registered(&self) -> Registered {
+    pub fn registered(&self) -> Registered {
         let [filters, user_geometries] = self.user_shapes.counts();
         let meshes = self
             .geometry

@@ -14,11 +14,9 @@
 //!
 //! Directions are unit, local, on the upper side.
 
-#[cfg(feature = "bench")]
 mod bake;
 pub(super) mod table;
 
-#[cfg(feature = "bench")]
 pub use bake::bake;
 
 use super::{Ggx, Microfacets};

@@ -6,7 +6,7 @@ use crate::color::Rgb;
 impl PrincipledParameters {
     /// A corner of the unit cube of ten parameters, for a white base; from bit 10 on: a thin sheet, half diffuse
     /// transmission.
-    pub(crate) fn white_corner(bits: u32) -> Self {
+    pub fn white_corner(bits: u32) -> Self {
         let bit = |i: u32| (bits >> i & 1) as f32;
         let thin = bits >> 10 & 1 == 1;
         Self {

@@ -24,7 +24,6 @@
 //! `principledthin`: added without limit, with exact Fresnel terms for the untinted layer, G as a product, no
 //! compensation, tints over the luminance, and a clear coat that is larger by 4 cos cos.
 
-#[cfg(feature = "bench")]
 mod corners;
 mod glass;
 mod parameters;

@@ -3,7 +3,7 @@
 use std::f32::consts::TAU;
 
 use glam::{Vec3 as V, vec3};
-use steradian::math::Rng;
+use steradian::internal::math::Rng;
 
 use super::Mesh;
 

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use glam::{Vec3 as V, vec3};
-use steradian::math::Rng;
+use steradian::internal::math::Rng;
 
 use super::plants::Single;
 use super::{Mesh, terrain};

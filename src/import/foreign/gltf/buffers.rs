@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use base64::Engine;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use gltf::json::{Root, buffer};
+use percent_encoding::percent_decode_str;
 
 use crate::error::{Error, Result};
 
@@ -119,13 +122,16 @@ impl Uri {
     pub fn parse(uri: &str) -> Result<Self, String> {
         if let Some(data) = uri.strip_prefix("data:") {
             let (kind, data) = data.split_once(',').ok_or("the data URI has no comma")?;
-            let bytes = if kind.ends_with(";base64") { base64(data)? } else { percent_decoded(data)? };
+            if !kind.ends_with(";base64") {
+                return Ok(Self::Data(percent_decode_str(data).collect()));
+            }
+            let bytes = BASE64.decode(data).map_err(|e| format!("the data is not base64: {e}"))?;
             return Ok(Self::Data(bytes));
         }
         if let Some((scheme, _)) = uri.split_once("://") {
             return Err(format!("cannot fetch {scheme} addresses"));
         }
-        let name = String::from_utf8(percent_decoded(uri)?).map_err(|_| "the URI is not UTF-8".to_string())?;
+        let name = percent_decode_str(uri).decode_utf8().map_err(|_| "the URI is not UTF-8")?.into_owned();
         if name.is_empty() {
             return Err("the URI is empty".into());
         }
@@ -133,52 +139,13 @@ impl Uri {
     }
 }
 
-/// The bytes of a text in which some stand as `%` and two digits. A `%` that no digits follow is itself.
-fn percent_decoded(text: &str) -> Result<Vec<u8>, String> {
-    let bytes = text.as_bytes();
-    let digit = |at: usize| bytes.get(at).and_then(|&b| char::from(b).to_digit(16));
-    let mut out = Vec::with_capacity(bytes.len());
-    let mut at = 0;
-    while let Some(&byte) = bytes.get(at) {
-        match (byte, digit(at + 1), digit(at + 2)) {
-            (b'%', Some(high), Some(low)) => {
-                out.push((high * 16 + low) as u8);
-                at += 3;
-            }
-            _ => {
-                out.push(byte);
-                at += 1;
-            }
-        }
-    }
-    Ok(out)
-}
-
-/// Decodes base64, with or without padding.
-fn base64(text: &str) -> Result<Vec<u8>, String> {
-    let mut out = Vec::with_capacity(text.len() / 4 * 3 + 2);
-    let (mut bits, mut count) = (0u32, 0);
-    for (at, byte) in text.trim_end_matches('=').bytes().enumerate() {
-        let value = match byte {
-            b'A'..=b'Z' => byte - b'A',
-            b'a'..=b'z' => byte - b'a' + 26,
-            b'0'..=b'9' => byte - b'0' + 52,
-            b'+' | b'-' => 62,
-            b'/' | b'_' => 63,
-            _ => return Err(format!("character {} of the data is not base64", at + 1)),
-        };
-        bits = bits << 6 | u32::from(value);
-        count += 6;
-        if count >= 8 {
-            count -= 8;
-            out.push((bits >> count) as u8);
-        }
-    }
-    if count == 6 {
-        return Err("the base64 data is cut short".into());
-    }
-    Ok(out)
-}
+/// Base64 with or without padding.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &base64::alphabet::STANDARD,
+    GeneralPurposeConfig::new()
+        .with_decode_allow_trailing_bits(true)
+        .with_decode_padding_mode(DecodePaddingMode::Indifferent),
+);
 
 #[cfg(test)]
 mod tests {

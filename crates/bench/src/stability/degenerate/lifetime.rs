@@ -1,0 +1,132 @@
+//! Scenes of no, one and many shapes, one after the other and side by side.
+
+use rayon::prelude::*;
+
+use super::{Effort, Outcome};
+use crate::accel::{AccelKind, Accelerator, EmbreeAccel, EmbreeOptions, EmbreeQuality, LinearAccel};
+use crate::bumpy_sphere;
+use crate::geometry::{Geometry, Shape, TransformedShape};
+use crate::math::{DMat3, DVec3, Ray, Transform};
+use crate::stability::geometry::{
+    Rng, all_analytic_shapes, cube, instances, meshes, ray, soup, transform, triangle, world,
+};
+use crate::stability::scenes::{all, all_answers, build, moving_scene, same, scenes, test_rays};
+
+/// How many answers of any accelerator are not the oracle's.
+fn differing(geometry: &Geometry, rays: &[Ray]) -> usize {
+    let oracle = LinearAccel::new(geometry);
+    let expected: Vec<_> = rays.iter().map(|ray| oracle.intersect(ray)).collect();
+    let is_same = |ray: &Ray, found, expected| match (found, expected) {
+        (Some(a), Some(b)) => same(geometry, ray, &a, &b),
+        (None, None) => true,
+        _ => false,
+    };
+    let wrong = |accel: &dyn Accelerator| {
+        rays.iter().zip(&expected).filter(|(ray, expected)| !is_same(ray, accel.intersect(ray), **expected)).count()
+    };
+    all(geometry).iter().map(|(_, accel)| wrong(&**accel)).sum()
+}
+
+/// Hits in scenes without a shape.
+fn hits_of_nothing(rays: &[Ray]) -> usize {
+    let no_shapes = instances(vec![], &[transform(DMat3::IDENTITY, DVec3::ZERO)]);
+    let of = |accel: &dyn Accelerator| {
+        let answers = all_answers(accel, rays).into_iter();
+        let hits: usize = answers
+            .map(|(hits, occluded)| hits.iter().flatten().count() + occluded.iter().filter(|o| **o).count())
+            .sum();
+        hits + usize::from(!accel.bounds().is_empty())
+    };
+    [Geometry::default(), no_shapes]
+        .iter()
+        .flat_map(|geometry| all(geometry).into_iter().map(|(_, accel)| of(&*accel)).collect::<Vec<_>>())
+        .sum()
+}
+
+fn single_shapes() -> Vec<Geometry> {
+    let analytic = all_analytic_shapes()
+        .into_iter()
+        .map(|(_, shape)| Shape::Analytic(TransformedShape::new(shape, Transform::IDENTITY)));
+    let triangle = Shape::Mesh(triangle(-DVec3::X, DVec3::new(1.0, 0.3, 0.2), DVec3::Y));
+    analytic.chain([triangle]).map(|shape| world(vec![shape])).collect()
+}
+
+/// Rays from inside of a closed mesh that leave it.
+fn leaks(effort: Effort, rng: &mut Rng) -> usize {
+    let geometry = meshes(vec![bumpy_sphere(effort.pick(20_000, 1_000_000))]);
+    let rays: Vec<Ray> = (0..effort.pick(2_000, 100_000)).map(|_| ray(0.5 * rng.cube(), rng.direction())).collect();
+    let kinds = AccelKind::ALL.into_iter().filter(|(kind, _)| *kind != AccelKind::Linear);
+    let lost = |accel: &dyn Accelerator| {
+        rays.par_iter().filter(|ray| accel.intersect(ray).is_none() || !accel.occluded(ray)).count()
+    };
+    kinds.map(|(kind, _)| lost(&*build(kind, &geometry))).sum()
+}
+
+/// Hits of three accelerators, traced in turn, that differ from those of each alone.
+fn disturbed(rng: &mut Rng) -> usize {
+    let geometries = [10, 100, 300].map(|count| meshes(vec![soup(rng, count, 0.4)]));
+    let rays = test_rays(rng, &geometries[0], 1_000);
+    let alone = geometries
+        .each_ref()
+        .map(|g| rays.iter().map(|ray| build(AccelKind::EMBREE, g).intersect(ray)).take(50).collect::<Vec<_>>());
+    let together = geometries.each_ref().map(|geometry| build(AccelKind::EMBREE, geometry));
+    let differing = |(i, ray): (usize, &Ray)| {
+        (0..3).filter(|&k| alone[k].get(i).is_some_and(|hit| *hit != together[k].intersect(ray))).count()
+    };
+    rays.iter().enumerate().map(differing).sum()
+}
+
+pub(super) fn e8_life_of_scenes(effort: Effort) -> Outcome {
+    let mut rng = Rng::new(81);
+    let any_rays = test_rays(&mut rng, &Geometry::default(), 100);
+    let mut single = 0;
+    for geometry in &single_shapes() {
+        let rays = test_rays(&mut rng, geometry, effort.pick(400, 40_000));
+        single += differing(geometry, &rays);
+    }
+    let mut moved = 0;
+    let mut place = DVec3::ZERO;
+    for _ in 0..16 {
+        place += 3.0 * rng.cube();
+        let geometry = meshes(vec![cube(rng.rotation(), place), cube(rng.rotation() * 0.5, -place)]);
+        let rays = test_rays(&mut rng, &geometry, effort.pick(100, 10_000));
+        moved += differing(&geometry, &rays);
+    }
+    Outcome::new()
+        .none("hits, or bounds, of nothing", hits_of_nothing(&any_rays))
+        .none("answers on scenes of one shape that are not the oracle's", single)
+        .none("rays that leave a closed mesh", leaks(effort, &mut rng))
+        .none("answers after moves that are not the oracle's", moved)
+        .none("answers that change with other accelerators around", disturbed(&mut rng))
+}
+
+pub(super) fn e9_memory(effort: Effort) -> Outcome {
+    let mut rng = Rng::new(91);
+    let mut geometries: Vec<Geometry> = scenes().into_iter().map(|(_, geometry)| geometry).collect();
+    geometries.push(moving_scene(&mut rng));
+    geometries.push(meshes(vec![bumpy_sphere(effort.pick(20_000, 1_000_000))]));
+    let (mut built, mut kept, mut unaccounted, mut failed, mut most) = (0, 0isize, 0, 0, 0);
+    for geometry in &geometries {
+        let rays = test_rays(&mut rng, geometry, 100);
+        for quality in [EmbreeQuality::Low, EmbreeQuality::Medium, EmbreeQuality::High] {
+            let options = EmbreeOptions { quality, ..EmbreeOptions::default() };
+            let Ok(accel) = EmbreeAccel::with_options(geometry, 2, options) else {
+                failed += 1;
+                continue;
+            };
+            // A triangle's corners alone are 36 bytes.
+            let triangles = geometry.world.iter().map(|id| geometry.shape(*id).prim_count()).sum::<usize>();
+            unaccounted += usize::from(accel.memory_bytes() < if triangles > 1_000 { 36 * triangles } else { 0 });
+            most = most.max(accel.memory_bytes());
+            all_answers(&accel, &rays);
+            kept += accel.release().abs();
+            built += 1;
+        }
+    }
+    Outcome::new()
+        .record("accelerators built", f64::from(built))
+        .none("that could not be built", failed)
+        .record("most bytes held", most as f64)
+        .none("large scenes that hold less than their corners", unaccounted)
+        .none("bytes held after the release", kept.unsigned_abs())
+}

@@ -1,0 +1,121 @@
+//! Picture files.
+
+use half::f16;
+
+use super::{Effort, Outcome, bytes, mean_by_film};
+use crate::color::linear_from_srgb;
+use crate::desc::{CompressionDesc, LayerKind, OutputDesc, PixelTypeDesc, ViewDesc};
+use crate::film::{Crop, Image, Layer, LayerInfo};
+use crate::output::{RenderInfo, read_exr, write_exr, write_png};
+use crate::stability::geometry::Rng;
+
+const COMPRESSIONS: [CompressionDesc; 5] =
+    [CompressionDesc::Zip, CompressionDesc::Zips, CompressionDesc::Piz, CompressionDesc::Rle, CompressionDesc::None];
+
+/// A cropped picture of every layer, with numbers of all sizes that a half holds or rounds.
+fn picture(rng: &mut Rng) -> Image {
+    let crop = Crop { x: 3, y: 2, width: 33, height: 21 };
+    let mut number = || (rng.magnitude(-9.0, 6.0) * rng.range(-1.0, 1.0).signum()) as f32;
+    let mut layer = |info: &'static LayerInfo| {
+        let values = crop.area() as usize * info.channels.len();
+        Layer::new(info.kind, (0..values).map(|_| number()).collect())
+    };
+    Image { size: [40, 30], crop, layers: LayerInfo::ALL.iter().map(&mut layer).collect(), ..Image::default() }
+}
+
+/// How many of the pictures end in a PNG of other bytes than the first. (An EXR holds the render time.)
+pub(super) fn differing_files(images: &[Image]) -> usize {
+    let Ok(folder) = tempfile::tempdir() else { return images.len() };
+    let written = |image: &Image| {
+        let path = folder.path().join("a.png");
+        write_png(&path, image, 0.0, ViewDesc::Srgb).ok()?;
+        std::fs::read(&path).ok()
+    };
+    let first = written(&images[0]);
+    images.iter().filter(|image| first.is_none() || written(image) != first).count()
+}
+
+/// How many numbers of a colour layer come back otherwise than as `expected`.
+fn changed(written: &Image, read: &Image, expected: impl Fn(f32) -> f32) -> usize {
+    if (read.size, read.crop) != (written.size, written.crop) || read.layers.is_empty() {
+        return written.layers[0].data.len();
+    }
+    read.layers[0]
+        .data
+        .iter()
+        .zip(&written.layers[0].data)
+        .filter(|(read, written)| read.to_bits() != expected(**written).to_bits())
+        .count()
+}
+
+/// To the nearest half; beyond the largest of them, that.
+fn halved(x: f32) -> f32 {
+    f16::from_f32(x).to_f32().clamp(f16::MIN.to_f32(), f16::MAX.to_f32())
+}
+
+/// Codes of a PNG of all codes that come back as others.
+fn changed_codes(folder: &std::path::Path) -> usize {
+    let path = folder.join("ramp.png");
+    let ramp = |i: u32| linear_from_srgb((i % 256) as f32 / 255.0);
+    let size = [256, 9];
+    let data = (0..size[0] * size[1]).flat_map(|i| [ramp(i), ramp(i + 85), ramp(i + 170), 1.0]).collect();
+    let image = Image::of_color(size, data);
+    let Some(read) = write_png(&path, &image, 0.0, ViewDesc::Srgb).ok().and_then(|()| image::open(&path).ok()) else {
+        return 256;
+    };
+    let code = |x: u32, shift: u32| ((x + shift) % 256) as u8;
+    read.into_rgb8()
+        .enumerate_pixels()
+        .filter(|(x, _, pixel)| pixel.0 != [code(*x, 0), code(*x, 85), code(*x, 170)])
+        .count()
+}
+
+/// The relative error of a film's mean of a million numbers from that of a compensated sum.
+fn error_of_sums(rng: &mut Rng) -> f64 {
+    let values: Vec<f32> = (0..1_000_000).map(|_| (rng.unit() * 1e3f64.powf(rng.unit())) as f32).collect();
+    let (mut exact, mut compensation) = (0f64, 0f64);
+    for v in &values {
+        let y = f64::from(*v) - compensation;
+        let t = exact + y;
+        compensation = (t - exact) - y;
+        exact = t;
+    }
+    let mean = exact / values.len() as f64;
+    (mean_by_film(values.into_iter()) / mean - 1.0).abs()
+}
+
+pub(super) fn m7_files(effort: Effort) -> Outcome {
+    let Ok(folder) = tempfile::tempdir() else { return Outcome::new() };
+    let path = folder.path().join("a.exr");
+    let mut rng = Rng::new(7);
+    let (mut floats, mut halves, mut again, mut lost) = (0, 0, 0, 0);
+    for _ in 0..effort.pick(2, 50) {
+        let image = picture(&mut rng);
+        for (compression, pixel_type) in
+            COMPRESSIONS.into_iter().flat_map(|c| [(c, PixelTypeDesc::Float), (c, PixelTypeDesc::Half)])
+        {
+            let layers = vec![LayerKind::Z, LayerKind::N, LayerKind::P, LayerKind::Albedo];
+            let desc = OutputDesc { layers, pixel_type, compression: Some(compression), ..OutputDesc::new("a.exr") };
+            let written = write_exr(&path, &image, &desc, &RenderInfo::default());
+            let Ok(read) = written.and_then(|()| read_exr(&path)) else {
+                lost += 1;
+                continue;
+            };
+            if pixel_type == PixelTypeDesc::Float {
+                floats += changed(&image, &read, |x| x);
+            } else {
+                halves += changed(&image, &read, halved);
+                // A picture of halves is written as it was read.
+                let twice = write_exr(&path, &read, &desc, &RenderInfo::default()).and_then(|()| read_exr(&path));
+                again += usize::from(twice.map(|image| bytes(&image)).ok() != Some(bytes(&read)));
+            }
+        }
+    }
+    Outcome::new()
+        .none("files that cannot be written or read", lost)
+        .none("floats that change", floats)
+        .none("halves that are not the nearest", halves)
+        .none("pictures of halves that change when written again", again)
+        .none("codes of a PNG that change", changed_codes(folder.path()))
+        .at_most("relative error of the mean of a million samples", error_of_sums(&mut rng), 1e-7)
+}

@@ -1,0 +1,147 @@
+//! The command line of `bench error`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use steradian::desc::{IntegratorDesc, SamplerKindDesc, StrategyDesc};
+use steradian::internal::accel::AccelKind;
+
+use super::import::ImportArgs;
+use super::{accel_help, parse_size, parse_switch};
+use crate::names;
+
+pub const ABOUT: &str = "\
+Measure error against time: variants of a render, and other renderers, beside a reference
+
+Renders the scene with every variant and every number of samples (or seconds), several times in turn, each time with \
+another seed, and compares each picture with the reference: relMSE, MSE, FLIP, bias, NaN; samples and rays per second; \
+how fast the error falls; the time that each variant takes to the same error.";
+
+pub const EXAMPLES: &str = "\
+Examples:
+  steradian bench error cornell.json --reference cornell.exr --out report
+      1 to 256 samples; report/error.html has plots and a viewer of differences, .md, .csv and .json the figures.
+  steradian bench error cornell.json --reference cornell.exr --sampler sobol,independent --strategy mis,light
+      Four variants side by side.
+  steradian bench error cornell.json --times 1,2,4,8 --integrator path --clamp 10
+      By time. Without a reference two renders of Steradian stand in.
+  steradian bench error cornell.xml --reference cornell.exr --external 'mitsuba=mitsuba -m llvm_ad_rgb -Dspp={spp} -o \
+{out} {scene}'
+      Beside another program. {scene} and {out} come quoted for the shell; {seed} is there too, and {seconds} with \
+--times. Its time is what it
+      prints as JSON, as {\"render_seconds\": 1.5} or {\"runs\": [{\"render_s\": [1.5]}]}, else that of its whole \
+process.
+  steradian bench error cornell.json --reference cornell.exr --spp 16 --tax
+      How much of the time is tracing: the render's own rays, traced by bare calls of Embree.
+
+How to read it: of two variants with slopes of about -1 the one with the higher efficiency is the better, by the ratio \
+of the two; a mean ratio whose
+interval leaves out 1 is a bias, or the reference's. Ctrl-C leaves what there is.";
+
+/// Arguments of `bench error`.
+#[derive(Debug, Args)]
+pub struct BenchErrorArgs {
+    /// The scene file: .json, .xml (Mitsuba 3), .pbrt (pbrt-v4), .gltf or .glb
+    pub scene: PathBuf,
+    /// The converged picture, an EXR file. Without it two renders by the first variant, with other seeds, stand in
+    #[arg(long, value_name = "REF")]
+    pub reference: Option<PathBuf>,
+    /// Samples per pixel
+    #[
+        arg(
+            long, value_name = "LIST", value_delimiter = ',', default_value = "1,4,16,64,256",
+            value_parser = clap::value_parser!(u32).range(1..)
+        )
+    ]
+    pub spp: Vec<u32>,
+    /// Seconds, in place of samples per pixel
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_seconds, conflicts_with = "spp")]
+    pub times: Vec<f64>,
+    /// Repetitions, each with another seed
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub repeat: u32,
+    /// Also record all rays of a short render and trace them again by bare calls of Embree: how much of the time is
+    /// tracing
+    #[arg(long)]
+    pub tax: bool,
+
+    /// Algorithms
+    #[
+        arg(
+            long, value_name = "LIST", value_delimiter = ',', value_parser = names::tagged::<IntegratorDesc>(),
+            help_heading = "Variants"
+        )
+    ]
+    pub integrator: Vec<IntegratorDesc>,
+    /// How samples are chosen
+    #[
+        arg(
+            long, value_name = "LIST", value_delimiter = ',', value_parser = names::plain::<SamplerKindDesc>(),
+            help_heading = "Variants"
+        )
+    ]
+    pub sampler: Vec<SamplerKindDesc>,
+    /// How directions towards lights are found
+    #[
+        arg(
+            long, value_name = "LIST", value_delimiter = ',', value_parser = names::plain::<StrategyDesc>(),
+            help_heading = "Variants"
+        )
+    ]
+    pub strategy: Vec<StrategyDesc>,
+    /// Whether paths learn where light comes from: on, off or both
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_switch, help_heading = "Variants")]
+    pub guiding: Vec<bool>,
+    /// Ray accelerator
+    #[arg(long, value_name = "LIST", value_delimiter = ',', long_help = accel_help(), help_heading = "Variants")]
+    pub accel: Vec<AccelKind>,
+    /// Another program, by a command that writes {out}; repeat for several
+    #[arg(long, value_name = "NAME=COMMAND", value_parser = parse_external, help_heading = "Variants")]
+    pub external: Vec<(String, String)>,
+    /// Only the programs of --external
+    #[arg(long, requires = "external", requires = "reference", help_heading = "Variants")]
+    pub only_external: bool,
+
+    /// Width and height in pixels, such as 1920x1080
+    #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = "Render")]
+    pub size: Option<[u32; 2]>,
+    /// Largest number of segments from the camera
+    #[arg(long, value_name = "N", help_heading = "Render")]
+    pub max_depth: Option<u32>,
+    /// Clamp the contribution of a single path of indirect light
+    #[arg(long, value_name = "LIMIT", help_heading = "Render")]
+    pub clamp: Option<f32>,
+    /// Number of threads; 0 means all
+    #[arg(long, value_name = "N", help_heading = "Render")]
+    pub threads: Option<usize>,
+    /// Seed of the first repeat
+    #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Render")]
+    pub seed: u64,
+
+    /// Folder for error.html, error.md, error.csv and error.json; without it tables go to stdout
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    pub out: Option<PathBuf>,
+    /// Without --out: print JSON instead of tables
+    #[arg(long, help_heading = "Output")]
+    pub json: bool,
+    /// Print only results and errors
+    #[arg(short, long, help_heading = "Output")]
+    pub quiet: bool,
+    #[command(flatten)]
+    pub import: ImportArgs,
+}
+
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.trim().parse::<f64>().ok().filter(|seconds| (1e-3..=1e6).contains(seconds));
+    seconds.ok_or_else(|| "expected seconds, from 0.001 to 1e6".to_owned())
+}
+
+fn parse_external(text: &str) -> Result<(String, String), String> {
+    let (name, command) = text.split_once('=').ok_or_else(|| "expected NAME=COMMAND".to_owned())?;
+    let (name, command) = (name.trim(), command.trim());
+    if name.is_empty() || command.is_empty() {
+        Err("expected NAME=COMMAND".into())
+    } else {
+        Ok((name.to_owned(), command.to_owned()))
+    }
+}
