@@ -63,6 +63,9 @@ fn reports_hold_every_accelerator_on_the_same_rays() {
     // The only address is the name of SVG's namespace.
     assert_eq!(html.matches("http").count(), html.matches("http://www.w3.org/2000/svg").count());
     assert!(html.matches("<svg").count() == 4 && html.ends_with("</html>\n"));
+    // Nodes visited, of every accelerator whose structure is open.
+    assert_eq!(html.matches("src=\"data:image/png;base64,").count(), 4);
+    assert!(html.contains("answers agree with the oracle"), "{html}");
 }
 
 #[test]

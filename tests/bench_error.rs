@@ -72,6 +72,8 @@ fn reports_compare_variants_and_programs_in_one_run() {
             // smaller.
             let bias = |key: &str| point["bias"][key].as_f64().unwrap();
             assert!((bias("ratio") - 1.0).abs() < 4.0 * (bias("high") - bias("low")), "{point}");
+            let seconds = |key: &str| point[key][0].as_f64().unwrap();
+            assert!(seconds("processor_seconds") > 0.0 && seconds("seconds") > 0.0, "{point}");
             assert_eq!((point["not_finite"].as_u64(), point["runs"].as_array().unwrap().len()), (Some(0), 2));
             assert!(point["flip"].as_f64().unwrap() > 0.0 && point["efficiency"][0].as_f64().unwrap() > 0.0, "{point}");
             assert_ne!(point["runs"][0]["seed"], point["runs"][1]["seed"]);
@@ -91,13 +93,18 @@ fn reports_compare_variants_and_programs_in_one_run() {
     );
 
     let csv = read("error.csv");
-    assert!(csv.lines().count() == 13 && csv.lines().all(|line| line.split(',').count() == 19), "{csv}");
+    assert!(csv.lines().count() == 13 && csv.lines().all(|line| line.split(',').count() == 20), "{csv}");
     let markdown = read("error.md");
     assert!(markdown.contains("| sobol | 16 spp |") && markdown.contains("Shading tax"), "{markdown}");
     let html = read("error.html");
     // The only address is the name of SVG's namespace.
     assert_eq!(html.matches("http").count(), html.matches("http://www.w3.org/2000/svg").count());
-    assert!(html.matches("<svg").count() == 2 && html.matches("<canvas>").count() == 3 && html.ends_with("</html>\n"));
+    assert!(html.matches("<svg").count() == 3 && html.matches("<canvas>").count() == 3 && html.ends_with("</html>\n"));
+    // The reference, and a picture and a FLIP map of each variant, which need no script.
+    assert_eq!(html.matches("src=\"data:image/png;base64,").count(), 7);
+    let verdict = html.split_once("class=\"verdict\">").unwrap().1.split_once("</p>").unwrap().0;
+    assert!(verdict.starts_with("sobol: ") && verdict.contains("as fast as independent to equal error"), "{verdict}");
+    assert!(verdict.contains("bias found") && markdown.contains(verdict), "{verdict}");
     let pictures = html.split_once("id=\"pictures\">").unwrap().1.split_once("</script>").unwrap().0;
     let pictures: Value = serde_json::from_str(pictures).unwrap();
     assert_eq!((&pictures["size"], pictures["tests"].as_array().unwrap().len()), (&json!([24, 16]), 6));

@@ -16,24 +16,24 @@ use steradian::internal::render::Progress;
 use crate::util::program::{Running, Signal};
 
 /// An answer: status, head, body.
-struct Answer {
-    status: u16,
+pub struct Answer {
+    pub status: u16,
     head: String,
-    body: Vec<u8>,
+    pub body: Vec<u8>,
 }
 
 impl Answer {
-    fn json(&self) -> Value {
+    pub fn json(&self) -> Value {
         assert_eq!(self.status, 200);
         serde_json::from_slice(&self.body).unwrap()
     }
 }
 
 /// One connection, for any number of requests.
-struct Client(BufReader<TcpStream>);
+pub struct Client(BufReader<TcpStream>);
 
 impl Client {
-    fn new(address: SocketAddr) -> Self {
+    pub fn new(address: SocketAddr) -> Self {
         Self(BufReader::new(TcpStream::connect(address).unwrap()))
     }
 
@@ -49,7 +49,7 @@ impl Client {
         Answer { status: head.split(' ').nth(1).unwrap().parse().unwrap(), head, body }
     }
 
-    fn get(&mut self, target: &str) -> Answer {
+    pub fn get(&mut self, target: &str) -> Answer {
         self.send(&format!("GET {target} HTTP/1.1\r\nHost: localhost\r\n\r\n"))
     }
 }
@@ -58,7 +58,7 @@ fn get(address: SocketAddr, target: &str) -> Answer {
     Client::new(address).get(target)
 }
 
-fn address(url: &str) -> SocketAddr {
+pub fn address(url: &str) -> SocketAddr {
     url.trim_start_matches("http://").trim_end_matches('/').parse().unwrap()
 }
 

@@ -140,5 +140,7 @@ mod trust;
 mod util;
 /// Colours of vertices: in pictures, from every kind of file, and what is refused.
 mod vertex_colors;
+/// Finished pictures in the browser: what is served of files, and which are refused.
+mod view;
 /// Options of the command line for view and focus.
 mod views;

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The page of --preview in a real browser: starts renders, opens their pages in headless Chromium and checks what the canvas shows, the exposure, layers,
+"""The pages of --preview and view in a real browser: starts renders, opens their pages in headless Chromium and checks what the canvas shows, the exposure, layers,
 zoom, pixel values, numbers, several tabs, and what is left when the program has ended.
 
     tools/preview_test.py [STERADIAN] [--pictures FOLDER]
@@ -307,6 +307,44 @@ def check_progress(browser):
     assert browser.run("return $('status').textContent") == "rendering"
 
 
+def check_view(browser, program, folder, pictures):
+    """The page of two finished files: sides of the slider, values of both, the map of differences."""
+    for name, spp in [("a", "1"), ("b", "16")]:
+        line = [program, "render", "ball.json", "-o", f"{name}.exr", "--layers", "Z", "--spp", spp, "--integrator", "path" if spp == "1" else "normal", "-q"]
+        subprocess.run(line, cwd=folder, check=True)
+    process = subprocess.Popen([program, "view", "a.exr", "b.exr", "--no-open"], cwd=folder, stdout=subprocess.PIPE, text=True)
+    Render.processes.append(process)
+    url = process.stdout.readline().strip()
+    browser.open(url)
+    mode = lambda: browser.run("return document.body.dataset.mode")
+    eventually("both pictures", lambda: mode() == "slider" and browser.run("return other !== null"))
+    # The sky is of light in one picture and black in the other.
+    browser.run("$('split').value = 50; draw()")
+    light, dark = [*agx(SKY, 0), 255], [*agx([0, 0, 0], 0), 255]
+    assert same(shown(browser, 2, 3), light, 1) and same(shown(browser, 90, 3), dark, 1), (shown(browser, 2, 3), shown(browser, 90, 3))
+    # Dragging the slider to the left uncovers the second picture.
+    start, end = on_page(browser, 48, 10), on_page(browser, 1, 10)
+    move = lambda x, y: {"type": "pointerMove", "x": x, "y": y, "duration": 0}
+    browser.pointer(move(*start), {"type": "pointerDown", "button": 0}, move(*end), {"type": "pointerUp", "button": 0})
+    assert same(shown(browser, 4, 3), dark, 1), shown(browser, 4, 3)
+    browser.pointer(move(*on_page(browser, 2, 3)))
+    values = lambda: browser.run("return [...document.querySelectorAll(\"#pixel td[data-channel='R']\")].map(d => Number(d.textContent))")
+    eventually("values of both", lambda: values() == [SKY[0], 0])
+    if pictures:
+        browser.run("$('split').value = 50; draw()")
+        browser.picture(os.path.join(pictures, "view.png"))
+    for name, expected in [("first", light), ("second", dark)]:
+        choose(browser, "mode", name)
+        eventually(name, lambda: mode() == name and same(shown(browser, 2, 3), expected, 1))
+    choose(browser, "mode", "flip")
+    eventually("FLIP", lambda: mode() == "flip" and 0 < float(number(browser, "Mean FLIP") or 0) <= 1)
+    choose(browser, "layer", 1)
+    eventually("Z", lambda: browser.run("return document.body.dataset.layer") == "Z")
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    assert process.returncode == 0, process.returncode
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("program", nargs="?", default="target/release/steradian")
@@ -371,6 +409,8 @@ def main():
             eventually("the end", lambda: status() == "connection lost")
             check_colors(browser)
             print("killed in the middle: passed")
+            check_view(browser, program, folder, arguments.pictures)
+            print("check_view: passed")
     finally:
         browser.close()
         for process in Render.processes:

@@ -8,9 +8,8 @@ use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyBytes, PyDict};
 use serde_json::Value;
 use steradian::desc::{OutputDesc, PixelTypeDesc, ViewDesc};
-use steradian::internal::output::{self, RenderInfo};
+use steradian::internal::output::{self, RenderInfo, flip};
 use steradian::{Image, Layer, Rendering};
-use steradian_bench::error::flip;
 
 use crate::convert::{from_json, picture};
 use crate::errors::OrRaise;

@@ -12,7 +12,7 @@ mod statistics;
 mod tev;
 
 pub use fan::Fan;
-pub use preview::{HttpTimeouts, Preview, PreviewOptions};
+pub use preview::{Compared, HttpTimeouts, Preview, PreviewOptions};
 pub use snapshot::Snapshot;
 pub use statistics::{ProgressNumbers, Statistics};
 pub use tev::{DEFAULT_ADDRESS, Tev, TevCounters, TevOptions};

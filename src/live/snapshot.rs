@@ -1,62 +1,77 @@
 //! A picture on its way to viewers.
 
-use crate::film::{Image, Layer};
+use crate::film::{Crop, Image};
+use crate::output::{ExrLayers, NamedLayer};
 
 /// A copy of a picture, shared by all that show it.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
-    /// The picture.
-    pub image: Image,
-    /// Samples per pixel in it.
-    pub spp: u32,
-    /// The full names of the channels of every layer, as in EXR files.
-    names: Vec<Vec<String>>,
+    /// Samples per pixel in it, if known.
+    pub spp: Option<u32>,
+    /// What the layers hold.
+    crop: Crop,
+    overscan: u32,
+    pub(super) layers: Vec<NamedLayer>,
 }
 
 impl Snapshot {
     /// A copy of a picture with its samples per pixel.
     pub fn new(image: &Image, spp: u32) -> Self {
-        // Layers that only files have are here without values.
-        let layers: Vec<Layer> = image.layers.iter().filter(|layer| !layer.data.is_empty()).cloned().collect();
-        let names = layers.iter().map(channel_names).collect();
-        Self {
-            image: Image { size: image.size, crop: image.crop, overscan: image.overscan, layers, coverage: None },
-            spp,
-            names,
-        }
+        // Layers that only files have are here without values. What no name can hold is replaced.
+        let layers = image.layers.iter().filter(|layer| !layer.data.is_empty()).map(|layer| NamedLayer {
+            names: layer.channel_names().iter().map(|name| name.replace('\0', "_")).collect(),
+            data: layer.data.clone(),
+        });
+        Self { spp: Some(spp), crop: image.crop, overscan: image.overscan, layers: layers.collect() }
     }
 
-    /// Every layer with the full names of its channels.
-    pub fn layers(&self) -> impl Iterator<Item = (&Layer, &[String])> {
-        self.image.layers.iter().zip(self.names.iter().map(Vec::as_slice))
+    /// The picture of a file.
+    pub fn of_file(file: ExrLayers) -> Self {
+        Self { spp: None, crop: file.crop, overscan: 0, layers: file.layers }
+    }
+
+    /// Every layer, the colour first.
+    pub fn layers(&self) -> impl Iterator<Item = &NamedLayer> {
+        self.layers.iter()
+    }
+
+    /// The first layer as a picture in linear light; gray is red, green and blue at once.
+    pub fn color(&self) -> Image {
+        let pixels = self.layers.first().map(|layer| layer.data.chunks_exact(layer.names.len()));
+        let color = |pixel: &[f32]| match *pixel {
+            [r, g, b, ..] => [r, g, b, 1.0],
+            [y, ..] => [y, y, y, 1.0],
+            [] => [0.0; 4],
+        };
+        Image::of_color(self.size(), pixels.into_iter().flatten().flat_map(color).collect())
     }
 
     /// The names of all channels, layer by layer.
     pub fn all_names(&self) -> impl Iterator<Item = &str> {
-        self.names.iter().flatten().map(String::as_str)
+        self.layers.iter().flat_map(|layer| &layer.names).map(String::as_str)
     }
 
     /// Width and height of the part that the layers hold, in pixels.
     pub fn size(&self) -> [u32; 2] {
-        [self.image.crop.width, self.image.crop.height]
+        [self.crop.width, self.crop.height]
     }
 
     /// Where the upper left corner of what the layers hold is in the picture to be shown; negative within the overscan.
     pub fn origin(&self) -> [i64; 2] {
-        [self.image.crop.x, self.image.crop.y].map(|x| i64::from(x) - i64::from(self.image.overscan))
+        [self.crop.x, self.crop.y].map(|x| i64::from(x) - i64::from(self.overscan))
     }
 
     /// Whether another has the same size and channels.
     pub fn is_shaped_like(&self, other: &Self) -> bool {
-        self.image.crop == other.image.crop && self.names == other.names
+        self.crop == other.crop && self.all_names().eq(other.all_names())
     }
 
-    /// What to call a layer with these channels: what is before the dot, or the channel if there is only one; `color`
-    /// for the picture itself.
+    /// What to call a layer with these channels: what is before the last dot, or the channel if there is only one;
+    /// `color` for the picture itself.
     pub fn title(names: &[String]) -> &str {
         match names {
             [] => "",
-            [first, rest @ ..] => match (first.split_once('.'), rest.is_empty()) {
+            [first, rest @ ..] => match (first.rsplit_once('.'), rest.is_empty()) {
                 (Some((title, _)), _) => title,
                 (None, true) => first,
                 (None, false) => "color",
@@ -65,15 +80,10 @@ impl Snapshot {
     }
 }
 
-/// The names of a layer's channels; what no name can hold is replaced.
-fn channel_names(layer: &Layer) -> Vec<String> {
-    layer.channel_names().iter().map(|name| name.replace('\0', "_")).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{Crop, LayerKind};
+    use crate::film::{Layer, LayerKind};
 
     #[test]
     fn layers_are_called_by_what_their_channels_share() {
@@ -84,6 +94,7 @@ mod tests {
             (title(&["Z"]), title(&["N.X", "N.Y", "N.Z"]), title(&["stats.samples"])),
             ("Z".into(), "N".into(), "stats".into())
         );
+        assert_eq!(title(&["View.Combined.R", "View.Combined.G", "View.Combined.B"]), "View.Combined");
     }
 
     #[test]

@@ -4,6 +4,7 @@ mod blocks;
 mod channels;
 mod coverage;
 mod header_order;
+mod layers;
 mod metadata;
 mod names;
 mod plan;
@@ -12,6 +13,7 @@ mod write;
 
 pub use blocks::write_image;
 pub use coverage::{Matte, matte};
+pub use layers::{ExrLayers, NamedLayer, read_exr_layers};
 pub use metadata::sidecar_path;
 pub use plan::{OutputFault, check_output, find_output_fault};
 pub use read::{read_exr, read_settings};

@@ -5,6 +5,7 @@ mod color_space;
 mod compare;
 pub mod cryptomatte;
 mod exr;
+pub mod flip;
 mod matrices;
 mod png;
 mod role;
@@ -12,11 +13,12 @@ mod uses;
 mod view;
 
 pub use self::exr::{
-    Matte, OutputFault, check_output, find_output_fault, matte, read_exr, read_settings, write_exr, write_image,
+    ExrLayers, Matte, NamedLayer, OutputFault, check_output, find_output_fault, matte, read_exr, read_exr_layers,
+    read_settings, write_exr, write_image,
 };
 pub use check::{Finding, RULES, Rule, Severity, check_exr};
 pub use compare::{Comparison, RELATIVE_FLOOR, compare};
-pub use png::write_png;
+pub use png::{encode_png, write_png};
 pub use uses::FileUses;
 
 use std::path::{Path, PathBuf};

@@ -1,5 +1,6 @@
 //! PNG: 8 bits a channel, for an sRGB display.
 
+use std::io::Write;
 use std::path::Path;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -9,7 +10,7 @@ use super::view::code_values;
 use super::write_atomically;
 use crate::color::Rgb;
 use crate::desc::ViewDesc;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::film::{Crop, Image, LayerKind};
 
 /// Writes the picture's colour in 8 bits through a view, after `exposure` stops. Colour is premultiplied, so leaving
@@ -19,12 +20,24 @@ use crate::film::{Crop, Image, LayerKind};
 /// # Errors
 /// [`Error::Output`](crate::Error::Output) if the file cannot be written.
 pub fn write_png(path: &Path, image: &Image, exposure: f32, view: ViewDesc) -> Result<()> {
+    write_atomically(path, |out| write_bytes(out, image, exposure, view))
+}
+
+/// The file that [`write_png`] writes.
+///
+/// # Errors
+/// [`Error::Internal`](crate::Error::Internal) if the picture has no pixels.
+pub fn encode_png(image: &Image, exposure: f32, view: ViewDesc) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    write_bytes(&mut bytes, image, exposure, view).map_err(Error::Internal)?;
+    Ok(bytes)
+}
+
+fn write_bytes(out: impl Write, image: &Image, exposure: f32, view: ViewDesc) -> std::result::Result<(), String> {
     let shown = shown(image);
     let bytes = encode(image, &shown, exposure, view);
-    write_atomically(path, |out| {
-        let encoder = PngEncoder::new_with_quality(out, CompressionType::Default, FilterType::Adaptive);
-        encoder.write_image(&bytes, shown.width, shown.height, ExtendedColorType::Rgb8).map_err(|e| e.to_string())
-    })
+    let encoder = PngEncoder::new_with_quality(out, CompressionType::Default, FilterType::Adaptive);
+    encoder.write_image(&bytes, shown.width, shown.height, ExtendedColorType::Rgb8).map_err(|e| e.to_string())
 }
 
 /// The part of the data that is to be shown: all but the overscan.

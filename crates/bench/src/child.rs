@@ -21,6 +21,8 @@ pub struct Ended {
     pub status: ExitStatus,
     /// Seconds from its start to its end.
     pub seconds: f64,
+    /// Processor seconds of it and of all it waited for, to a hundredth.
+    pub processor_seconds: f64,
     /// What it wrote to standard output.
     pub stdout: String,
     /// The end of what it wrote to standard error, in one line.
@@ -40,7 +42,7 @@ pub fn run(command: &mut Command, input: Option<&str>, stop: &AtomicBool) -> Res
             File::open(&input_file).map_err(|e| fault(&input_file, e))?.into()
         }
     };
-    let start = Instant::now();
+    let (start, before) = (Instant::now(), processor_seconds_of_children());
     let mut child = command
         // Of its own, so that all of it can be ended.
         .process_group(0)
@@ -51,8 +53,18 @@ pub fn run(command: &mut Command, input: Option<&str>, stop: &AtomicBool) -> Res
         .map_err(|e| format!("it cannot be started: {e}"))?;
     let Some(status) = wait(&mut child, stop).map_err(|e| e.to_string())? else { return Ok(None) };
     let seconds = start.elapsed().as_secs_f64();
+    let processor_seconds = processor_seconds_of_children() - before;
     let text = |path: &Path| String::from_utf8_lossy(&std::fs::read(path).unwrap_or_default()).into_owned();
-    Ok(Some(Ended { status, seconds, stdout: text(&output_file), stderr: tail(&text(&error_file)) }))
+    Ok(Some(Ended { status, seconds, processor_seconds, stdout: text(&output_file), stderr: tail(&text(&error_file)) }))
+}
+
+/// Processor seconds of all processes that this one has waited for; 0 where the system does not provide it.
+fn processor_seconds_of_children() -> f64 {
+    // Fields 16 and 17 of proc_pid_stat(5), the 14th and 15th after the name, in ticks.
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let fields = stat.rsplit_once(')').map_or("", |(_, rest)| rest).split_whitespace();
+    let ticks: u64 = fields.skip(13).take(2).filter_map(|field| field.parse::<u64>().ok()).sum();
+    ticks as f64 / rustix::param::clock_ticks_per_second() as f64
 }
 
 /// Waits for the end; `None` if `stop` came first.
@@ -86,9 +98,10 @@ mod tests {
 
     #[test]
     fn a_command_reads_its_input_and_returns_its_status() {
-        let ended =
-            run(Command::new("sh").args(["-c", "cat; echo no >&2; exit 3"]), Some("a text"), &AtomicBool::new(false));
+        let work = "cat; echo no >&2; i=0; while [ $i -lt 100000 ]; do i=$((i+1)); done; exit 3";
+        let ended = run(Command::new("sh").args(["-c", work]), Some("a text"), &AtomicBool::new(false));
         let ended = ended.unwrap().unwrap();
+        assert!(ended.processor_seconds > 0.0, "{}", ended.processor_seconds);
         assert_eq!((ended.status.code(), ended.stdout.as_str(), ended.stderr.as_str()), (Some(3), "a text", "no"));
         assert_eq!(tail(&"ab ".repeat(1000)).chars().count(), TAIL);
     }

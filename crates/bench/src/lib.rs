@@ -24,8 +24,10 @@ use steradian::internal::{
     printable, render, sampling, scene,
 };
 
-pub use machine::Machine;
-pub use measure::{AccelReport, BuildReport, KindReport, Mode, Options, RateReport, SceneReport, bench_scene};
+pub use machine::{Machine, Spent};
+pub use measure::{
+    AccelReport, BuildReport, KindReport, Mode, NodeMap, Options, RateReport, SceneReport, Subject, bench_scene,
+};
 pub use mesh::{bumpy_sphere, head};
 pub use naive::{MatrixLinear, NaiveBvh, NaiveKdTree, NaiveOctree};
 pub use record::{RayKind, RaySet, record};

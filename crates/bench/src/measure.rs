@@ -7,12 +7,13 @@ use serde::Serialize;
 
 use super::agreement::{self, Agreement};
 use super::machine::{memory_in_use, reset_peak_memory};
-use super::{RayKind, RaySet, Watch, epo, median_and_range};
+use super::{RayKind, RaySet, Spent, Watch, epo, median_and_range};
 use crate::accel::inspect::{Inspect, StructureStats, TraversalCounts};
 use crate::accel::{self, AccelKind, Accelerator, Coherence, HitRows, LinearAccel};
 use crate::geometry::Geometry;
 use crate::math::rows::BATCH;
-use crate::math::{Ray, RayRows};
+use crate::math::{Ray, RayRows, Vec2};
+use crate::scene::Scene;
 use steradian::{Error, Result};
 
 /// Options of a benchmark.
@@ -54,6 +55,8 @@ pub struct SceneReport {
     pub oracle: String,
     /// One for each accelerator.
     pub accels: Vec<AccelReport>,
+    /// What the rounds that were timed took.
+    pub spent: Spent,
     /// Whether it was ended early.
     pub interrupted: bool,
 }
@@ -75,6 +78,18 @@ pub struct AccelReport {
     pub structure: Option<StructureReport>,
     /// By kind of ray.
     pub kinds: Vec<KindReport>,
+    /// Nodes opened by the camera rays of a small picture, where the structure is open.
+    #[serde(skip)]
+    pub node_map: Option<NodeMap>,
+}
+
+/// Nodes opened, pixel by pixel.
+#[derive(Clone, Debug)]
+pub struct NodeMap {
+    /// Width and height.
+    pub size: [u32; 2],
+    /// Of the ray through the middle of each pixel, row by row from the top.
+    pub nodes: Vec<u64>,
 }
 
 /// Builds with one number of threads.
@@ -172,17 +187,42 @@ const COUNTED: usize = 100_000;
 /// Primitive tests that the oracle may cost for each kind of ray.
 const ORACLE_TESTS: u64 = 200_000_000;
 
-/// Runs everything on one scene.
+/// Longer side of maps of nodes, in pixels.
+const MAP_SIDE: f64 = 192.0;
+
+/// A scene to measure.
+pub struct Subject<'a> {
+    /// Its name in the report.
+    pub name: &'a str,
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Width and height of its picture.
+    pub size: [u32; 2],
+}
+
+impl Subject<'_> {
+    /// Nodes that an open structure visits for the camera rays of a small picture.
+    fn node_map(&self, inspect: &dyn Inspect) -> NodeMap {
+        let longer = f64::from(self.size[0].max(self.size[1]));
+        let size = self.size.map(|side| ((f64::from(side) * MAP_SIDE / longer).round() as u32).max(1));
+        let camera = &self.scene.camera;
+        let nodes = |i: u32| {
+            let film = Vec2::new((i % size[0]) as f32 + 0.5, (i / size[0]) as f32 + 0.5);
+            let ray = camera.ray(film, size, [0.5; 2], camera.time(0.5));
+            let mut work = TraversalCounts::default();
+            inspect.intersect_counted(&ray, &mut work);
+            work.nodes
+        };
+        NodeMap { size, nodes: (0..size[0] * size[1]).map(nodes).collect() }
+    }
+}
+
+/// Runs everything on one scene, with rays recorded in it.
 ///
 /// # Errors
 /// If an accelerator cannot be built.
-pub fn bench_scene(
-    name: &str,
-    geometry: &Geometry,
-    sets: &[RaySet],
-    options: &Options,
-    watch: &dyn Watch,
-) -> Result<SceneReport> {
+pub fn bench_scene(subject: &Subject, sets: &[RaySet], options: &Options, watch: &dyn Watch) -> Result<SceneReport> {
+    let (name, geometry) = (subject.name, &subject.scene.geometry);
     let primitives: usize = geometry.shapes.iter().map(crate::geometry::Shape::prim_count).sum();
     let mut accels: Vec<Measured> = Vec::new();
     for &kind in &options.accels {
@@ -190,7 +230,9 @@ pub fn bench_scene(
             break;
         }
         watch.step(&format!("{name}: building {kind}"));
-        accels.push(build(kind, geometry, primitives, options)?);
+        let (mut report, accel) = build(kind, geometry, primitives, options)?;
+        report.node_map = accel.inspect().map(|open| subject.node_map(open));
+        accels.push((report, accel));
     }
     let oracle = choose_oracle(&accels);
     let mut report = SceneReport {
@@ -201,6 +243,7 @@ pub fn bench_scene(
         absent: RayKind::ALL.into_iter().filter(|kind| sets.iter().all(|set| set.kind != *kind)).collect(),
         oracle: String::new(),
         accels: Vec::new(),
+        spent: Spent::default(),
         interrupted: false,
     };
     let replay = Replay { name, geometry, primitives, proxy: oracle, options, watch };
@@ -210,7 +253,9 @@ pub fn bench_scene(
             report.interrupted = true;
             break;
         }
-        compared += replay.replay(set, &mut accels)?;
+        let (checked, spent) = replay.replay(set, &mut accels)?;
+        compared += checked;
+        report.spent.add(spent);
     }
     report.oracle = match oracle {
         None => format!("linear, on {compared} rays"),
@@ -275,6 +320,7 @@ fn build<'g>(kind: AccelKind, geometry: &'g Geometry, primitives: usize, options
         peak_build_bytes: peak,
         structure,
         kinds: Vec::new(),
+        node_map: None,
     };
     Ok((report, accel))
 }
@@ -308,15 +354,15 @@ impl Replay<'_> {
         ((tests / self.primitives.max(1) as u64) as usize).clamp(16, set.rays.len().max(16)).min(set.rays.len())
     }
 
-    /// Replays one kind of ray; gives the number of rays that were compared with the oracle itself.
-    fn replay(&self, set: &RaySet, accels: &mut [Measured]) -> Result<usize> {
+    /// Replays one kind of ray; gives the number of rays that were compared with the oracle itself, and the time.
+    fn replay(&self, set: &RaySet, accels: &mut [Measured]) -> Result<(usize, Spent)> {
         let checked = self.affordable(set, ORACLE_TESTS);
         let agreements = self.agreements(set, accels, checked);
         let rays_of = |report: &AccelReport| {
             if report.name == "linear" { self.affordable(set, self.options.linear_tests) } else { set.rays.len() }
         };
         let counts: Vec<usize> = accels.iter().map(|(report, _)| rays_of(report)).collect();
-        let rates = self.rates(set, accels, &counts)?;
+        let (rates, spent) = self.rates(set, accels, &counts)?;
         for ((((report, accel), agreement), rates), rays) in accels.iter_mut().zip(agreements).zip(rates).zip(counts) {
             let counted = accel
                 .inspect()
@@ -335,7 +381,7 @@ impl Replay<'_> {
                 agreement,
             });
         }
-        Ok(checked)
+        Ok((checked, spent))
     }
 
     /// Compares the hits of the first `checked` rays with the oracle's, of the others with the proxy's.
@@ -358,7 +404,8 @@ impl Replay<'_> {
     }
 
     /// Times every accelerator in turn, again and again, so that whatever else the machine does falls on all alike.
-    fn rates(&self, set: &RaySet, accels: &[Measured], counts: &[usize]) -> Result<Vec<Rates>> {
+    fn rates(&self, set: &RaySet, accels: &[Measured], counts: &[usize]) -> Result<(Vec<Rates>, Spent)> {
+        let mut spent = Spent::default();
         let Self { name, options, watch, .. } = self;
         let of_threads = |mode: Mode| options.threads.iter().map(move |&threads| (mode, threads, Vec::new()));
         let mut times: Vec<Rates> = accels
@@ -373,15 +420,16 @@ impl Replay<'_> {
                         continue;
                     }
                     let rays = &set.rays[..counts[i]];
-                    let seconds = replay(&**accel, rays, *mode, set.kind.is_any_hit(), *threads)?;
+                    let once = replay(&**accel, rays, *mode, set.kind.is_any_hit(), *threads)?;
+                    spent.add(once);
                     // The first round warms caches and page tables up.
                     if round > 0 {
-                        rates.push(rays.len() as f64 / seconds * 1e-6);
+                        rates.push(rays.len() as f64 / once.seconds * 1e-6);
                     }
                 }
             }
         }
-        Ok(times)
+        Ok((times, spent))
     }
 }
 
@@ -407,8 +455,8 @@ fn modes(kind: RayKind, accel: &str) -> &'static [Mode] {
     }
 }
 
-/// Seconds to trace all rays.
-fn replay(accel: &dyn Accelerator, rays: &[Ray], mode: Mode, any_hit: bool, threads: usize) -> Result<f64> {
+/// Traces all rays.
+fn replay(accel: &dyn Accelerator, rays: &[Ray], mode: Mode, any_hit: bool, threads: usize) -> Result<Spent> {
     let singles = |rays: &[Ray]| {
         if any_hit {
             black_box(rays.iter().filter(|ray| accel.occluded(ray)).count());
@@ -431,26 +479,20 @@ fn replay(accel: &dyn Accelerator, rays: &[Ray], mode: Mode, any_hit: bool, thre
     };
     let blocks = if mode == Mode::Single { Vec::new() } else { RayRows::blocks(rays) };
     if threads == 1 {
-        let start = Instant::now();
-        if mode == Mode::Single {
-            singles(rays);
-        } else {
-            batches(&blocks);
-        }
-        return Ok(start.elapsed().as_secs_f64());
+        let all = || if mode == Mode::Single { singles(rays) } else { batches(&blocks) };
+        return Ok(Spent::on(1, all).1);
     }
     use rayon::prelude::*;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
         .map_err(|e| Error::Internal(format!("cannot start {threads} threads: {e}")))?;
-    Ok(pool.install(|| {
-        let start = Instant::now();
+    let all = || {
         if mode == Mode::Single {
             rays.par_chunks(CHUNK).for_each(singles);
         } else {
             blocks.par_chunks(CHUNK / BATCH).for_each(batches);
         }
-        start.elapsed().as_secs_f64()
-    }))
+    };
+    Ok(pool.install(|| Spent::on(threads, all).1))
 }

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::mesh::{bumpy_sphere, head};
 use super::naive::{MatrixLinear, NaiveBvh, NaiveKdTree, NaiveOctree};
-use super::{Machine, Watch};
+use super::{Machine, Spent, Watch};
 use crate::accel::inspect::TraversalCounts;
 use crate::accel::{self, AccelKind, Accelerator};
 use crate::geometry::{Geometry, Mesh};
@@ -74,6 +74,8 @@ pub struct ComparisonRow {
 pub struct FrameTiming {
     /// Seconds of a frame: median, lowest and highest.
     pub frame_seconds: [f64; 3],
+    /// Processor seconds of a frame: the median.
+    pub processor_seconds: f64,
     /// Seconds of it within the accelerator: the median.
     pub accel_seconds: f64,
     /// Width and height that were rendered, where times are scaled up.
@@ -87,6 +89,10 @@ pub struct ReportsReport {
     pub machine: Machine,
     /// Width and height of a frame.
     pub size: [u32; 2],
+    /// What all frames took.
+    pub spent: Spent,
+    /// Whether it ended before the last of them.
+    pub interrupted: bool,
     /// The comparisons.
     pub comparisons: Vec<Comparison>,
 }
@@ -97,16 +103,18 @@ pub struct ReportsReport {
 /// If an accelerator cannot be built or a picture does not fit in memory.
 pub fn bench_reports(options: &ReportsOptions, watch: &dyn Watch) -> Result<ReportsReport> {
     let machine = Machine::here();
-    let mut comparisons = Vec::new();
+    let (mut comparisons, mut spent) = (Vec::new(), Spent::default());
     for plan in [octree as Plan, kd_tree, bvh] {
         if !watch.is_stopped() {
-            comparisons.push(plan(options, watch)?);
+            let (comparison, of_frames) = plan(options, watch)?;
+            comparisons.push(comparison);
+            spent.add(of_frames);
         }
     }
-    Ok(ReportsReport { machine, size: options.size, comparisons })
+    Ok(ReportsReport { machine, size: options.size, spent, interrupted: watch.is_stopped(), comparisons })
 }
 
-type Plan = fn(&ReportsOptions, &dyn Watch) -> Result<Comparison>;
+type Plan = fn(&ReportsOptions, &dyn Watch) -> Result<(Comparison, Spent)>;
 
 /// Builds an accelerator over a geometry that outlives it.
 type Build = Box<dyn for<'g> Fn(&'g Geometry) -> Result<Subject<'g>>>;
@@ -153,7 +161,7 @@ macro_rules! naive {
 /// What is to be measured: a name, the report's figure, whether every triangle is tested, and how it is built.
 struct Entry(&'static str, Option<&'static str>, bool, Build);
 
-fn octree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
+fn octree(options: &ReportsOptions, watch: &dyn Watch) -> Result<(Comparison, Spent)> {
     let entries = [
         Entry("linear as in the report", Some("120 s"), true, naive!(MatrixLinear::new)),
         Entry("linear", None, true, own(AccelKind::Linear)),
@@ -161,7 +169,7 @@ fn octree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
         Entry("octree", None, false, own(AccelKind::Octree)),
         Entry("embree", Some("0.5 s"), false, own(AccelKind::EMBREE)),
     ];
-    let mut comparison =
+    let (mut comparison, spent) =
         compare("A head of 968 triangles: linear, octree, Embree", &head(968), &entries, options, watch)?;
     comparison.claim = "120 s linear, 3.5 s octree, 0.5 s Embree, at 1200x800 with one sample a pixel and one thread \
                         (ratios 240 : 7 : 1).";
@@ -200,10 +208,10 @@ fn octree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
             ),
         ];
     }
-    Ok(comparison)
+    Ok((comparison, spent))
 }
 
-fn kd_tree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
+fn kd_tree(options: &ReportsOptions, watch: &dyn Watch) -> Result<(Comparison, Spent)> {
     let entries = [
         Entry("linear", Some("1"), true, own(AccelKind::Linear)),
         Entry("kd-tree as in the report", Some("about 10 times faster"), false, naive!(NaiveKdTree::new)),
@@ -211,7 +219,8 @@ fn kd_tree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
         Entry("kdtree", None, false, own(AccelKind::KdTree(accel::KdTreeOptions { median: false }))),
         Entry("embree", None, false, own(AccelKind::EMBREE)),
     ];
-    let mut comparison = compare("1,000 triangles: linear, kd-tree", &bumpy_sphere(1_000), &entries, options, watch)?;
+    let (mut comparison, spent) =
+        compare("1,000 triangles: linear, kd-tree", &bumpy_sphere(1_000), &entries, options, watch)?;
     comparison.claim = "A kd-tree is \"about 10 times\" faster than the linear loop on a mesh of 1,000 triangles.";
     comparison.sources = vec![
         "Stated by the report: \"about 10 times\", on a mesh named after 1,000 triangles.".into(),
@@ -234,10 +243,10 @@ fn kd_tree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
                 .into(),
         ];
     }
-    Ok(comparison)
+    Ok((comparison, spent))
 }
 
-fn bvh(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
+fn bvh(options: &ReportsOptions, watch: &dyn Watch) -> Result<(Comparison, Spent)> {
     let entries = [
         Entry("linear", Some("1"), true, own(AccelKind::Linear)),
         Entry(
@@ -251,7 +260,8 @@ fn bvh(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
         Entry("bvh", None, false, own(AccelKind::Bvh(accel::BvhOptions::default()))),
         Entry("embree", None, false, own(AccelKind::EMBREE)),
     ];
-    let mut comparison = compare("70,000 triangles: linear, BVH", &bumpy_sphere(70_000), &entries, options, watch)?;
+    let (mut comparison, spent) =
+        compare("70,000 triangles: linear, BVH", &bumpy_sphere(70_000), &entries, options, watch)?;
     comparison.claim = "A BVH is \"17.61 times\" faster than the linear loop on 70,580 triangles.";
     comparison.sources = vec![
         "Stated by the report: 14 h 28 min 22 s with 16 samples a pixel, 9 h 51 min 48 s with 192, path traced; per \
@@ -291,7 +301,7 @@ fn bvh(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
             ),
         ];
     }
-    Ok(comparison)
+    Ok((comparison, spent))
 }
 
 fn compare(
@@ -300,11 +310,12 @@ fn compare(
     entries: &[Entry],
     options: &ReportsOptions,
     watch: &dyn Watch,
-) -> Result<Comparison> {
+) -> Result<(Comparison, Spent)> {
     let triangles = mesh.triangles().len();
     let benchmark = FrameBenchmark { title, mesh, entries, options, watch };
     let [normals, paths] = [Kind::Normals, Kind::Paths].map(|kind| measure(benchmark, kind));
-    let (normals, paths) = (normals?, paths?);
+    let ((normals, mut spent), (paths, of_paths)) = (normals?, paths?);
+    spent.add(of_paths);
     let rows = entries.iter().zip(normals).zip(paths).map(|((Entry(name, reported, ..), of_normals), of_paths)| {
         ComparisonRow {
             name: (*name).to_owned(),
@@ -316,13 +327,15 @@ fn compare(
             different_pixels: of_normals.different_pixels,
         }
     });
-    Ok(Comparison { title, triangles, claim: "", sources: Vec::new(), rows: rows.collect(), reasons: Vec::new() })
+    let rows = rows.collect();
+    Ok((Comparison { title, triangles, claim: "", sources: Vec::new(), rows, reasons: Vec::new() }, spent))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::Unwatched;
+    use crate::report::Report;
 
     #[test]
     fn every_accelerator_draws_the_same_picture_and_trees_test_less() {

@@ -4,7 +4,8 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::{Options, Watch, median_and_range, mesh::sphere_geometry};
+use super::machine::processor_seconds;
+use super::{Options, Spent, Watch, median_and_range, mesh::sphere_geometry};
 use crate::accel::{self, AccelKind};
 use crate::math::{Ray, Vec3};
 use steradian::Result;
@@ -20,6 +21,8 @@ pub struct ScalingReport {
     /// By accelerator: slopes of the logarithms of the time per ray and of the time of a build over the logarithm of
     /// the number of triangles.
     pub slopes: Vec<(String, f64, f64)>,
+    /// What tracing took.
+    pub spent: Spent,
 }
 
 /// Cost of one accelerator on a mesh of one size.
@@ -59,7 +62,7 @@ fn rays() -> Vec<Ray> {
 /// If an accelerator cannot be built.
 pub fn bench_scaling(first: usize, last: usize, options: &Options, watch: &dyn Watch) -> Result<ScalingReport> {
     let rays = rays();
-    let mut points: Vec<ScalingPoint> = Vec::new();
+    let (mut points, mut spent): (Vec<ScalingPoint>, _) = (Vec::new(), Spent::default());
     let mut triangles = first.max(100);
     while triangles <= last && !watch.is_stopped() {
         watch.step(&format!("scaling: {triangles} triangles"));
@@ -77,10 +80,12 @@ pub fn bench_scaling(first: usize, last: usize, options: &Options, watch: &dyn W
             let build_milliseconds = start.elapsed().as_secs_f64() * 1e3;
             let mut times = Vec::new();
             for round in 0..=options.rounds.min(3) {
-                let start = Instant::now();
+                let (start, before) = (Instant::now(), processor_seconds());
                 std::hint::black_box(rays[..affordable].iter().filter(|ray| accel.intersect(ray).is_some()).count());
+                let seconds = start.elapsed().as_secs_f64();
+                spent.add(Spent::new(1, seconds, processor_seconds() - before));
                 if round > 0 {
-                    times.push(start.elapsed().as_secs_f64() * 1e9 / affordable as f64);
+                    times.push(seconds * 1e9 / affordable as f64);
                 }
             }
             points.push(ScalingPoint {
@@ -105,7 +110,7 @@ pub fn bench_scaling(first: usize, last: usize, options: &Options, watch: &dyn W
         Some((name, of_rays, of_builds))
     });
     let slopes = slopes.collect();
-    Ok(ScalingReport { points, slopes })
+    Ok(ScalingReport { points, slopes, spent })
 }
 
 /// A straight line through the logarithms of both coordinates, by least squares.

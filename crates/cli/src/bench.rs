@@ -10,10 +10,10 @@ use steradian::internal::compile;
 use steradian::internal::render::{Overrides, Settings};
 use steradian::{Error, Result};
 use steradian_bench::agreement::{describe, parse_ray};
-use steradian_bench::report::Report;
+use steradian_bench::report::{AccelsReport, Report};
 use steradian_bench::stability::{self, CheckReport, Effort, StabilityReport};
 use steradian_bench::{
-    Machine, Options, ReportsOptions, SceneReport, Watch, bench_reports, bench_scaling, bench_scene, record,
+    Machine, Options, ReportsOptions, SceneReport, Subject, Watch, bench_reports, bench_scaling, bench_scene, record,
 };
 
 use crate::args::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityArgs, Verbosity};
@@ -64,14 +64,15 @@ fn accel(arguments: &BenchAccelArgs) -> Result<u8> {
         let rays = record(&scene, &*recorder, &settings, arguments.rays as usize)?;
         drop(recorder);
         let name = path.file_stem().map_or_else(|| "scene".into(), |stem| stem.to_string_lossy().into_owned());
-        scenes.push(bench_scene(&name, &scene.geometry, &rays, &options, &watch)?);
+        let subject = Subject { name: &name, scene: &scene, size: settings.size };
+        scenes.push(bench_scene(&subject, &rays, &options, &watch)?);
     }
     let scaling = match arguments.scaling {
         Some([first, last]) if !watch.is_stopped() => Some(bench_scaling(first, last, &options, &watch)?),
         _ => None,
     };
     watch.bar.finish_and_clear();
-    let report = Report { machine, command: command_line(), scenes, scaling };
+    let report = AccelsReport { machine, command: command_line(), scenes, scaling };
     match &arguments.out {
         Some(folder) => {
             report.write_to(folder)?;
@@ -104,7 +105,13 @@ fn reports(arguments: &BenchReportsArgs) -> Result<u8> {
         bench_reports(&ReportsOptions { size: arguments.size, rounds: arguments.rounds as usize, tests }, &watch)?;
     watch.bar.finish_and_clear();
     match &arguments.out {
-        Some(folder) => report.write_to(folder)?,
+        Some(folder) => {
+            report.write_to(folder)?;
+            if !arguments.quiet {
+                let place = format!("reports.html, reports.md and reports.json are in {}", folder.display());
+                text::print(&format!("{}\n{place}", report.markdown().trim_end()))?;
+            }
+        }
         None => text::print(if arguments.json { report.json()? } else { report.markdown() }.trim_end())?,
     }
     Ok(if watch.is_stopped() { interrupt.exit_code() } else { 0 })
@@ -144,7 +151,7 @@ fn stability(arguments: &BenchStabilityArgs) -> Result<u8> {
     let report = report(results, interrupted);
     match &arguments.out {
         Some(folder) => {
-            report.write_to(folder)?;
+            report.write_with_evidence_to(folder)?;
             if !arguments.quiet {
                 let place = format!("stability.html, stability.md and stability.json are in {}", folder.display());
                 text::print(&[report.lines(), vec![place]].concat().join("\n"))?;

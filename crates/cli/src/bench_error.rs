@@ -11,6 +11,7 @@ use steradian::internal::{compile, output};
 use steradian::{Error, Result};
 use steradian_bench::Watch;
 use steradian_bench::error::{Budget, ErrorOptions, External, Standard, Subject, Variant, bench_error};
+use steradian_bench::report::Report;
 
 use crate::args::{BenchErrorArgs, Verbosity};
 use crate::bench::{Steps, command_line, spinner};

@@ -7,6 +7,7 @@ use std::process::Command;
 use steradian::internal::output;
 use steradian::{Error, Result};
 use steradian_bench::Watch;
+use steradian_bench::report::Report;
 use steradian_bench::scale::{Case, ScaleOptions, bench_scale, run_case};
 
 use crate::args::BenchScaleArgs;

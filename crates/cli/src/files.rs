@@ -66,6 +66,10 @@ impl<'a> NamedFiles<'a> {
             Command::CheckExr(arguments) => {
                 self.read.extend(arguments.files.iter().map(|path| (path.as_path(), "a file to check")));
             }
+            Command::View(arguments) => {
+                let files = [Some(&arguments.file), arguments.other.as_ref()];
+                self.read.extend(files.into_iter().flatten().map(|path| (path.as_path(), "a picture to show")));
+            }
             Command::Compare(arguments) => {
                 self.read
                     .extend([(arguments.reference.as_path(), "the reference"), (arguments.test.as_path(), "the test")]);

@@ -29,6 +29,7 @@ mod rerender;
 mod scene;
 mod skipped;
 mod text;
+mod view;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -104,6 +105,7 @@ fn run(cli: Cli, uses: FileUses) -> Result<u8> {
         Command::Replay(_) => Err(Error::Usage("replay: give the scene, the pixel and the sample first".into())),
         Command::Compare(arguments) => compare::run(&arguments).map(|()| 0),
         Command::Denoise(arguments) => denoise::run(&arguments, uses).map(|()| 0),
+        Command::View(arguments) => view::run(&arguments).map(|()| 0),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "steradian", &mut script);

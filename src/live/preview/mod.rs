@@ -9,13 +9,15 @@ mod http;
 mod respond;
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use super::{Snapshot, Statistics};
 use crate::desc::ViewDesc;
 use crate::error::Result;
+use crate::output::NamedLayer;
+use crate::output::flip::hdr_flip;
 use crate::render::refused;
 use board::Board;
 pub use http::HttpTimeouts;
@@ -52,10 +54,35 @@ impl Default for PreviewOptions {
     }
 }
 
+/// A picture that another one is compared with.
+pub struct Compared {
+    name: String,
+    snapshot: Snapshot,
+    flip: OnceLock<NamedLayer>,
+}
+
+impl Compared {
+    /// A picture with its name.
+    pub fn new(name: String, snapshot: Snapshot) -> Self {
+        Self { name, snapshot, flip: OnceLock::new() }
+    }
+
+    /// How much the picture shown seems to differ from this one, by FLIP, computed at the first request; of pictures of
+    /// different sizes nothing.
+    fn flip(&self, shown: &Snapshot) -> &NamedLayer {
+        self.flip.get_or_init(|| NamedLayer {
+            names: vec!["FLIP".to_owned()],
+            data: hdr_flip(&shown.color(), &self.snapshot.color()).unwrap_or_default(),
+        })
+    }
+}
+
 /// What all connections share.
 struct Shared {
     board: Board,
-    statistics: Arc<Statistics>,
+    /// Of a render.
+    statistics: Option<Arc<Statistics>>,
+    compared: Option<Compared>,
     name: String,
     view: ViewDesc,
     /// The host given: requests may name it.
@@ -77,6 +104,30 @@ impl Preview {
     /// # Errors
     /// [`Error::Setting`](crate::Error::Setting) if the address and port are not to be had.
     pub fn new(options: &PreviewOptions, name: String, statistics: Arc<Statistics>) -> Result<Self> {
+        Self::start(options, name, Some(statistics), None)
+    }
+
+    /// Starts to serve a finished picture, which may be compared with another of the same size.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn of_picture(
+        options: &PreviewOptions,
+        name: String,
+        snapshot: Snapshot,
+        compared: Option<Compared>,
+    ) -> Result<Self> {
+        let preview = Self::start(options, name, None, compared)?;
+        preview.show_final(&Arc::new(snapshot));
+        Ok(preview)
+    }
+
+    fn start(
+        options: &PreviewOptions,
+        name: String,
+        statistics: Option<Arc<Statistics>>,
+        compared: Option<Compared>,
+    ) -> Result<Self> {
         let unusable = |e: &dyn std::fmt::Display| {
             refused("preview", format!(": cannot listen at {}:{}: {e}", options.host, options.port))
         };
@@ -87,6 +138,7 @@ impl Preview {
         let shared = Arc::new(Shared {
             board: Board::default(),
             statistics,
+            compared,
             name,
             view: options.view,
             host: host.to_ascii_lowercase(),

@@ -4,8 +4,11 @@
 //! |---|---|
 //! | `/` | the page |
 //! | `/state?page=P&have=V` | numbers, layers as JSON; page P has picture V; the next is requested without `idle=1` |
-//! | `/layer?index=I` | a layer: version, width, height, channels (little-endian u32), then rows of 16-bit floats |
+//! | `/layer?index=I&picture=P` | a layer: version, width, height, channels (little-endian u32), then 16-bit floats |
 //! | `/pixel?x=X&y=Y` | every layer's exact values at a pixel as JSON |
+//! | `/flip` | how much two pictures seem to differ, as a layer of one channel |
+//!
+//! Picture 1 is the one that another is compared with, 0 the other; without `picture` it is 0.
 
 use std::io;
 
@@ -15,6 +18,7 @@ use serde_json::{Value, json};
 
 use super::http::{Connection, Request};
 use super::{Shared, Snapshot};
+use crate::output::NamedLayer;
 
 const PAGE: &str = include_str!("page.html");
 
@@ -33,7 +37,19 @@ pub fn respond(connection: &mut Connection, request: &Request, shared: &Shared) 
             }
             connection.respond(OK, JSON, state(shared).to_string().as_bytes())
         }
+        "/layer" if request.number("picture") == Some(1) => {
+            let index = request.number("index").and_then(|index| usize::try_from(index).ok());
+            let layer = shared.compared.as_ref().and_then(|other| other.snapshot.layers().nth(index?));
+            match (&shared.compared, layer) {
+                (Some(other), Some(layer)) => send(connection, 1, other.snapshot.size(), layer),
+                _ => not_found(connection),
+            }
+        }
         "/layer" => layer(connection, request, shared),
+        "/flip" => match shared.compared.as_ref().zip(shared.board.current().snapshot) {
+            Some((other, snapshot)) => send(connection, 1, snapshot.size(), other.flip(&snapshot)),
+            None => not_found(connection),
+        },
         "/pixel" => match pixel(request, shared) {
             Some(value) => connection.respond(OK, JSON, value.to_string().as_bytes()),
             None => not_found(connection),
@@ -49,10 +65,8 @@ fn not_found(connection: &mut Connection) -> io::Result<()> {
 fn state(shared: &Shared) -> Value {
     let shown = shared.board.current();
     let snapshot = shown.snapshot.as_deref();
-    let layers = snapshot.map(|snapshot| {
-        let layer = |names: &[String]| json!({ "name": Snapshot::title(names), "channels": names });
-        snapshot.layers().map(|(_, names)| layer(names)).collect::<Vec<_>>()
-    });
+    let compared =
+        shared.compared.as_ref().map(|other| json!({ "name": other.name, "layers": layers_of(&other.snapshot) }));
     json!({
         "name": shared.name,
         "view": shared.view.name(),
@@ -60,10 +74,16 @@ fn state(shared: &Shared) -> Value {
         "finished": shown.finished,
         "size": snapshot.map(Snapshot::size),
         "origin": snapshot.map(Snapshot::origin),
-        "picture_spp": snapshot.map(|snapshot| snapshot.spp),
-        "layers": layers.unwrap_or_default(),
-        "statistics": shared.statistics.numbers(),
+        "picture_spp": snapshot.and_then(|snapshot| snapshot.spp),
+        "layers": snapshot.map(layers_of).unwrap_or_default(),
+        "statistics": shared.statistics.as_ref().map(|statistics| statistics.numbers()),
+        "compared": compared,
     })
+}
+
+fn layers_of(snapshot: &Snapshot) -> Vec<Value> {
+    let layer = |layer: &NamedLayer| json!({ "name": Snapshot::title(&layer.names), "channels": layer.names });
+    snapshot.layers().map(layer).collect()
 }
 
 /// The connection holds its picture while it sends.
@@ -73,9 +93,15 @@ fn layer(connection: &mut Connection, request: &Request, shared: &Shared) -> io:
     };
     let index = request.number("index").and_then(|index| usize::try_from(index).ok());
     let (Some(snapshot), Some(index)) = (shown.snapshot, index) else { return not_found(connection) };
-    let Some((layer, names)) = snapshot.layers().nth(index) else { return not_found(connection) };
-    let [width, height] = snapshot.size();
-    let head = [shown.version as u32, width, height, names.len() as u32];
+    match snapshot.layers().nth(index) {
+        Some(layer) => send(connection, shown.version as u32, snapshot.size(), layer),
+        None => not_found(connection),
+    }
+}
+
+/// Sends a layer of a picture of this size.
+fn send(connection: &mut Connection, version: u32, size: [u32; 2], layer: &NamedLayer) -> io::Result<()> {
+    let head = [version, size[0], size[1], layer.names.len() as u32];
     connection.start(
         OK,
         "application/octet-stream",
@@ -102,14 +128,18 @@ fn pixel(request: &Request, shared: &Shared) -> Option<Value> {
         return None;
     }
     let index = usize::try_from(y * width + x).ok()?;
-    let values = |data: &[f32], channels: usize| -> Vec<Value> {
-        data.chunks_exact(channels).nth(index).unwrap_or_default().iter().map(|value| number(*value)).collect()
+    let compared = shared.compared.as_ref().map(|other| values_of(&other.snapshot, index));
+    let layers = values_of(&snapshot, index);
+    Some(json!({ "version": shown.version, "x": x, "y": y, "layers": layers, "compared": compared }))
+}
+
+/// Every layer's values at a pixel.
+fn values_of(snapshot: &Snapshot, index: usize) -> Vec<Value> {
+    let values = |layer: &NamedLayer| -> Vec<Value> {
+        let mut pixels = layer.data.chunks_exact(layer.names.len());
+        pixels.nth(index).unwrap_or_default().iter().map(|value| number(*value)).collect()
     };
-    let layers: Vec<Value> = snapshot
-        .layers()
-        .map(|(layer, names)| json!({ "channels": names, "values": values(&layer.data, names.len()) }))
-        .collect();
-    Some(json!({ "version": shown.version, "x": x, "y": y, "layers": layers }))
+    snapshot.layers().map(|layer| json!({ "channels": layer.names, "values": values(layer) })).collect()
 }
 
 /// The shortest decimal that is this value; JSON has no others than finite ones, so the rest are texts.

@@ -4,6 +4,7 @@ use std::io::BufReader;
 use std::path::Path;
 
 use exr::meta::attribute::{AttributeValue, ChannelDescription, IntegerBounds};
+use exr::meta::header::Header;
 use exr::prelude::Vec2;
 
 use super::metadata::{SETTINGS, text};
@@ -27,24 +28,12 @@ pub fn read_exr(path: &Path) -> Result<Image> {
     let source = file::open(path).map_err(|e| Error::Missing { file: path.to_owned(), message: e.to_string() })?;
     let malformed = |message: String| Error::Malformed { file: path.to_owned(), message };
     let headers = read_headers(path).map_err(malformed)?;
-    let flat = headers.iter().enumerate().filter(|(_, header)| !header.deep);
-    let Some((part, choice)) =
-        flat.filter_map(|(part, header)| Some((part, choose_channels(&header.channels.list)?))).next()
-    else {
-        let deep = if headers.iter().any(|header| header.deep) { " (deep data is unsupported)" } else { "" };
-        let names: Vec<String> =
-            headers.iter().flat_map(|header| &header.channels.list).map(|c| c.name.to_string()).collect();
-        return Err(malformed(format!("no channels R, G and B and no Y{deep}; it has {}", names.join(", "))));
-    };
+    let (part, choice) = choose_channels(path, &headers)?;
     let header = &headers[part];
     let (mut requested, mut components) = (Vec::new(), Vec::new());
     for (component, channel) in
         choice.into_iter().enumerate().filter_map(|(component, channel)| Some((component, channel?)))
     {
-        let channel_header = &header.channels.list[channel];
-        if channel_header.sampling != Vec2(1, 1) {
-            return Err(malformed(format!("channel {} is subsampled", channel_header.name)));
-        }
         requested.push(Place { part, channel });
         components.push(component);
     }
@@ -57,8 +46,31 @@ pub fn read_exr(path: &Path) -> Result<Image> {
     Ok(Image { size, crop, layers: vec![Layer::new(LayerKind::Color, data)], ..Image::default() })
 }
 
+/// The part that holds the colour, and its red, green, blue and (if there is one) alpha.
+///
+/// # Errors
+/// [`Error::Malformed`] if no part has a colour, or it is subsampled.
+pub(super) fn choose_channels(path: &Path, headers: &[Header]) -> Result<(usize, [Option<usize>; 4])> {
+    let malformed = |message: String| Error::Malformed { file: path.to_owned(), message };
+    let flat = headers.iter().enumerate().filter(|(_, header)| !header.deep);
+    let Some((part, choice)) =
+        flat.filter_map(|(part, header)| Some((part, choose_in_part(&header.channels.list)?))).next()
+    else {
+        let deep = if headers.iter().any(|header| header.deep) { " (deep data is unsupported)" } else { "" };
+        let names: Vec<String> =
+            headers.iter().flat_map(|header| &header.channels.list).map(|c| c.name.to_string()).collect();
+        return Err(malformed(format!("no channels R, G and B and no Y{deep}; it has {}", names.join(", "))));
+    };
+    for channel in choice.into_iter().flatten().map(|channel| &headers[part].channels.list[channel]) {
+        if channel.sampling != Vec2(1, 1) {
+            return Err(malformed(format!("channel {} is subsampled", channel.name)));
+        }
+    }
+    Ok((part, choice))
+}
+
 /// Red, green, blue and (if there is one) alpha.
-fn choose_channels(list: &[ChannelDescription]) -> Option<[Option<usize>; 4]> {
+fn choose_in_part(list: &[ChannelDescription]) -> Option<[Option<usize>; 4]> {
     let find = |name: &str| list.iter().position(|channel| channel.name == *name);
     let layer = |prefix: &str, names: [&str; 4]| {
         let [r, g, b, a] = names.map(|name| find(&format!("{prefix}{name}")));
@@ -73,7 +85,7 @@ fn choose_channels(list: &[ChannelDescription]) -> Option<[Option<usize>; 4]> {
         .or_else(|| find("Y").map(|y| [Some(y), Some(y), Some(y), find("A")]))
 }
 
-fn windows(display: &IntegerBounds, position: Vec2<i32>, size: Vec2<usize>) -> ([u32; 2], Crop) {
+pub(super) fn windows(display: &IntegerBounds, position: Vec2<i32>, size: Vec2<usize>) -> ([u32; 2], Crop) {
     let [width, height] = [size.0, size.1].map(|length| u32::try_from(length).unwrap_or(u32::MAX));
     let whole = ([width, height], Crop::full([width, height]));
     let offset = [position.0.checked_sub(display.position.0), position.1.checked_sub(display.position.1)];

@@ -1,12 +1,20 @@
 //! Whether a renderer is right in the mean.
 
+use statrs::distribution::{ContinuousCDF, Normal};
+
 use crate::film::{Image, LayerKind};
 
 /// Side of a block of pixels. Neighbours may share noise through a filter; the means of blocks hardly do.
 const BLOCK: usize = 8;
 
-/// The two-sided 95 % quantile of the normal distribution: there are hundreds of blocks.
-const QUANTILE: f64 = 1.959_964;
+/// The probability that all intervals of a report hold what they estimate.
+const CONFIDENCE: f64 = 0.95;
+
+/// How many standard deviations each of `intervals` two-sided intervals reaches, so that all of them together hold with
+/// [`CONFIDENCE`] (Bonferroni). By the normal distribution: a picture has hundreds of blocks.
+fn quantile(intervals: usize) -> f64 {
+    Normal::standard().inverse_cdf(1.0 - 0.5 * (1.0 - CONFIDENCE) / intervals.max(1) as f64)
+}
 
 /// Sums of the luminance and of its difference from the reference, block by block, over any number of pictures.
 #[derive(Clone, Debug, Default)]
@@ -34,10 +42,11 @@ impl Blocks {
         }
     }
 
-    /// The mean of the tests over that of the reference, and the ends of its 95 % confidence interval; `None` for a
-    /// black reference or a single block. Under the hypothesis of no bias the differences of blocks are independent and
-    /// centred, so that the variance of their sum is the sum of their squares; it holds the reference's noise too.
-    pub(super) fn ratio(&self) -> Option<[f64; 3]> {
+    /// The mean of the tests over that of the reference, and the ends of its confidence interval, one of `intervals`
+    /// that hold together with 95 %; `None` for a black reference or a single block. Under the hypothesis of no bias the
+    /// differences of blocks are independent and centred, so that the variance of their sum is the sum of their squares;
+    /// it holds the reference's noise too.
+    pub(super) fn ratio(&self, intervals: usize) -> Option<[f64; 3]> {
         let n = self.differences.len() as f64;
         if n < 2.0 || !(self.reference > 0.0) {
             return None;
@@ -46,7 +55,7 @@ impl Blocks {
         let squares: f64 = self.differences.iter().map(|d| (d - mean).powi(2)).sum();
         let deviation = (squares * n / (n - 1.0)).sqrt();
         let ratio = 1.0 + mean * n / self.reference;
-        let half = QUANTILE * deviation / self.reference;
+        let half = quantile(intervals) * deviation / self.reference;
         Some([ratio, ratio - half, ratio + half])
     }
 }
@@ -78,22 +87,27 @@ mod tests {
             centred.add(&reference, &picture(|i| 2.0 + noise[i]));
             brighter.add(&reference, &picture(|i| 2.02 + noise[i]));
         }
-        let [ratio, low, high] = centred.ratio().unwrap();
+        let [ratio, low, high] = centred.ratio(1).unwrap();
         // Uniform noise has a deviation of 12^-1/2; the ratio's is that over twice the root of the number of values.
-        let half = QUANTILE * (1.0f64 / 12.0).sqrt() / 2.0 / (3.0 * 2048.0f64).sqrt();
+        let half = quantile(1) * (1.0f64 / 12.0).sqrt() / 2.0 / (3.0 * 2048.0f64).sqrt();
         assert!(((high - low) / 2.0 / half - 1.0).abs() < 0.6, "{half} {low} {high}");
-        assert!((ratio - 1.0).abs() < 5.0 * half / QUANTILE && low < ratio && ratio < high);
-        let [ratio, low, _] = brighter.ratio().unwrap();
-        assert!((ratio - 1.01).abs() < 5.0 * half / QUANTILE && low > 1.0, "{ratio} {low}");
+        assert!((ratio - 1.0).abs() < 5.0 * half / quantile(1) && low < ratio && ratio < high);
+        let [ratio, low, _] = brighter.ratio(1).unwrap();
+        assert!((ratio - 1.01).abs() < 5.0 * half / quantile(1) && low > 1.0, "{ratio} {low}");
+    }
+
+    #[test]
+    fn many_intervals_are_wider() {
+        assert!((quantile(1) - 1.959_964).abs() < 1e-6 && (quantile(20) - 3.023_341).abs() < 1e-6);
     }
 
     #[test]
     fn equal_pictures_have_a_ratio_of_one_and_black_ones_none() {
         let mut blocks = Blocks::default();
         blocks.add(&picture(|i| i as f32), &picture(|i| i as f32));
-        assert_eq!(blocks.ratio(), Some([1.0; 3]));
+        assert_eq!(blocks.ratio(1), Some([1.0; 3]));
         let mut black = Blocks::default();
         black.add(&picture(|_| 0.0), &picture(|_| 1.0));
-        assert_eq!(black.ratio(), None);
+        assert_eq!(black.ratio(1), None);
     }
 }

@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 use serde_json::Value;
 
 use super::plan::{Budget, Measured};
+use crate::Spent;
 use crate::child::{self, Ended};
 use crate::output::read_exr;
 use steradian::{Error, Result};
@@ -47,7 +48,9 @@ impl External {
         let out = folder.path().join("out.exr");
         let line = self.line(&out, budget, seed);
         let ended = child::run(Command::new("sh").args(["-c", &line]), None, stop).map_err(failed)?;
-        let Some(Ended { status, seconds: process_seconds, stdout, stderr }) = ended else { return Ok(None) };
+        let Some(Ended { status, seconds: process_seconds, processor_seconds, stdout, stderr }) = ended else {
+            return Ok(None);
+        };
         if !status.success() || !out.exists() {
             let what = if status.success() { "it wrote no {out}".to_owned() } else { status.to_string() };
             return Err(failed(format!("{what}; command: {line}; its messages end in: {stderr}")));
@@ -58,6 +61,8 @@ impl External {
         Ok(Some(Measured {
             seconds: printed.seconds.unwrap_or(process_seconds),
             process_seconds: Some(process_seconds),
+            // How many threads it started is not known: the share of their time is not judged.
+            spent: Spent { processor_seconds, ..Spent::default() },
             spp,
             samples: spp.map(|spp| u64::from(spp) * image.crop.area()),
             rays: None,

@@ -5,18 +5,17 @@
 
 mod bias;
 mod external;
-pub mod flip;
-mod page;
 mod plan;
 mod report;
 mod summary;
 mod tax;
+mod viewer;
 
 pub use external::External;
-pub use page::Pictures;
 pub use plan::{Budget, ErrorOptions, Standard, Subject, Variant};
 pub use summary::{Bias, EqualError, ErrorReport, Point, ReferenceInfo, Run, VariantReport};
 pub use tax::TaxReport;
+pub use viewer::Pictures;
 
 use std::sync::atomic::AtomicBool;
 
@@ -24,6 +23,7 @@ use self::bias::Blocks;
 use self::plan::{Measured, Program};
 use super::{Machine, Watch};
 use crate::film::Image;
+use crate::output::flip::{hdr_flip, mean};
 use crate::output::{Comparison, compare};
 use crate::scene::Scene;
 use steradian::{Error, Result};
@@ -68,7 +68,7 @@ pub fn bench_error(
         return Ok(report);
     };
     report.reference = reference.info.clone();
-    report.pictures = Pictures::new(&reference.image);
+    report.pictures = Pictures::new(&reference.image)?;
     let all_fit = report.pictures.fit(options.variants.len() * options.budgets.len());
     let mut blocks = vec![vec![Blocks::default(); options.budgets.len()]; options.variants.len()];
     'all: for repeat in 0..options.repeats {
@@ -82,7 +82,14 @@ pub fn bench_error(
                     if all_fit || Some(*budget) == options.largest_budget() {
                         report.pictures.add(v, b, &measured.image);
                     }
-                    run.flip = Some(flip::mean(&flip::hdr_flip(&reference.image, &measured.image)?));
+                    let differences = hdr_flip(&reference.image, &measured.image)?;
+                    run.flip = Some(mean(&differences));
+                    if Some(*budget) == options.largest_budget() {
+                        report.pictures.show(&variant.name, &measured.image, &differences)?;
+                    }
+                }
+                if measured.process_seconds.is_none() {
+                    report.spent.add(measured.spent);
                 }
                 blocks[v][b].add(&reference.image, &measured.image);
                 report.add(v, b, Run { repeat, seed, ..run });
@@ -162,6 +169,7 @@ fn judge(reference: &Reference, measured: &Measured, name: &str) -> Result<Run> 
         spp: measured.spp,
         seconds: measured.seconds,
         process_seconds: measured.process_seconds,
+        processor_seconds: measured.spent.processor_seconds,
         mse,
         relmse,
         relmse_trimmed,

@@ -8,8 +8,10 @@ use std::time::Duration;
 use serde::Serialize;
 
 use super::External;
+use crate::Spent;
 use crate::accel::{self, AccelKind, Accelerator};
 use crate::film::Image;
+use crate::machine::processor_seconds;
 use crate::render::{self, Settings, Silent};
 use crate::scene::Scene;
 use steradian::Result;
@@ -114,6 +116,8 @@ pub(super) struct Measured {
     pub(super) seconds: f64,
     /// Seconds of the whole process, of other programs.
     pub(super) process_seconds: Option<f64>,
+    /// What it took on this program's threads, or on those that another program may have started.
+    pub(super) spent: Spent,
     pub(super) spp: Option<u32>,
     pub(super) samples: Option<u64>,
     pub(super) rays: Option<u64>,
@@ -175,12 +179,15 @@ impl<'a> Program<'a> {
             }
         };
         let settings = Settings { spp, time_limit, seed, ..Settings::clone(settings) };
+        let before = processor_seconds();
         let result = render::render(self.scene, accel, &settings, &Silent, self.stop)?;
         let stats = result.stats;
+        let spent = Spent::new(settings.threads, stats.render_seconds, processor_seconds() - before);
         Ok((!stats.interrupted).then(|| Measured {
             image: result.image,
             seconds: stats.render_seconds,
             process_seconds: None,
+            spent,
             spp: Some(stats.spp_done),
             samples: Some(stats.samples),
             rays: Some(stats.rays.total()),

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::bias::Blocks;
 use super::plan::{ErrorOptions, Subject};
 use super::{Budget, Pictures, TaxReport};
-use crate::{Machine, fitted_slope, median_and_range};
+use crate::{Machine, Spent, fitted_slope, median_and_range};
 
 /// Everything that a run has found.
 #[derive(Clone, Debug, Serialize)]
@@ -22,6 +22,8 @@ pub struct ErrorReport {
     pub repeats: usize,
     /// Whether it ended before the last of them.
     pub interrupted: bool,
+    /// What the renders of Steradian took.
+    pub spent: Spent,
     /// In the order of the command line.
     pub variants: Vec<VariantReport>,
     /// The time that each takes to the same error.
@@ -68,6 +70,8 @@ pub struct Point {
     pub spp: Option<f64>,
     /// Seconds of the render.
     pub seconds: [f64; 3],
+    /// Processor seconds, of all threads together; of other programs those of the whole process.
+    pub processor_seconds: [f64; 3],
     /// Mean of `(test - reference)² / (reference² + 0.01)`.
     pub relmse: [f64; 3],
     /// The same without the worst thousandth of the pixels.
@@ -95,8 +99,8 @@ pub struct Point {
 pub struct Bias {
     /// The ratio.
     pub ratio: f64,
-    /// Lower end of its 95 % confidence interval, from the differences of blocks of 8 x 8 pixels summed over the
-    /// repeats.
+    /// Lower end of its confidence interval, from the differences of blocks of 8 x 8 pixels summed over the repeats.
+    /// All intervals of a report together hold with 95 %.
     pub low: f64,
     /// Upper end.
     pub high: f64,
@@ -115,6 +119,8 @@ pub struct Run {
     pub seconds: f64,
     /// Seconds of the process, of another program.
     pub process_seconds: Option<f64>,
+    /// Processor seconds, of all threads together; of another program those of the whole process.
+    pub processor_seconds: f64,
     /// Mean of `(test - reference)²`.
     pub mse: f64,
     /// Mean of `(test - reference)² / (reference² + 0.01)`.
@@ -143,6 +149,15 @@ pub struct EqualError {
     /// Seconds by variant, between the points measured on straight lines of the logarithms; where a variant was better
     /// from the start, what follows from its first point with a slope of -1.
     pub seconds: Vec<Option<f64>>,
+    /// By variant: how many times as fast as the first it is, each repeat by itself; median, lowest and highest.
+    pub times_as_fast: Vec<Option<[f64; 3]>>,
+}
+
+impl Bias {
+    /// Whether the interval leaves out 1.
+    pub fn is_found(&self) -> bool {
+        !(self.low..=self.high).contains(&1.0)
+    }
 }
 
 impl ErrorReport {
@@ -162,6 +177,7 @@ impl ErrorReport {
             reference: ReferenceInfo::default(),
             repeats: options.repeats,
             interrupted: false,
+            spent: Spent::default(),
             variants: variants.collect(),
             equal_error: None,
             tax: None,
@@ -180,16 +196,33 @@ impl ErrorReport {
 
     /// Fills in what follows from the runs.
     pub(super) fn summarize(&mut self, blocks: &[Vec<Blocks>]) {
+        let intervals = blocks.iter().flatten().filter(|blocks| blocks.ratio(1).is_some()).count();
         for (variant, blocks) in self.variants.iter_mut().zip(blocks) {
             for (point, blocks) in variant.points.iter_mut().zip(blocks) {
                 point.summarize();
-                point.bias = blocks.ratio().map(|[ratio, low, high]| Bias { ratio, low, high });
+                point.bias = blocks.ratio(intervals).map(|[ratio, low, high]| Bias { ratio, low, high });
             }
             variant.slope_of_time = slope(&variant.curve());
             variant.slope_of_spp = slope(&variant.curve_of_spp());
         }
         let curves: Vec<Vec<(f64, f64)>> = self.variants.iter().map(VariantReport::curve).collect();
-        self.equal_error = equal_error(&curves);
+        self.equal_error = equal_error(&curves).map(|(relmse, seconds)| {
+            let times_as_fast = self.times_as_fast();
+            EqualError { relmse, seconds, times_as_fast }
+        });
+    }
+
+    /// How many times as fast as the first each variant reaches the same error, over the repeats.
+    fn times_as_fast(&self) -> Vec<Option<[f64; 3]>> {
+        let mut ratios = vec![Vec::new(); self.variants.len()];
+        for repeat in 0..self.repeats {
+            let curves: Vec<_> = self.variants.iter().map(|variant| variant.curve_of_repeat(repeat)).collect();
+            let Some((_, seconds)) = equal_error(&curves) else { continue };
+            for (ratios, own) in ratios.iter_mut().zip(&seconds) {
+                ratios.extend(seconds[0].zip(*own).map(|(first, own)| first / own));
+            }
+        }
+        ratios.iter().map(|ratios| (!ratios.is_empty()).then(|| median_and_range(ratios))).collect()
     }
 }
 
@@ -204,15 +237,23 @@ impl VariantReport {
         self.curve_over(|point| point.spp)
     }
 
+    /// Seconds and relMSE of one repeat, by time.
+    fn curve_of_repeat(&self, repeat: usize) -> Vec<(f64, f64)> {
+        let runs = self.points.iter().filter_map(|point| point.runs.iter().find(|run| run.repeat == repeat));
+        sorted(runs.map(|run| (run.seconds, run.relmse)))
+    }
+
     fn curve_over(&self, of: impl Fn(&Point) -> Option<f64>) -> Vec<(f64, f64)> {
         let measured = self.points.iter().filter(|point| !point.runs.is_empty());
-        let mut curve: Vec<_> = measured
-            .filter_map(|point| Some((of(point)?, point.relmse[0])))
-            .filter(|(x, y)| *x > 0.0 && *y > 0.0)
-            .collect();
-        curve.sort_by(|a, b| a.0.total_cmp(&b.0));
-        curve
+        sorted(measured.filter_map(|point| Some((of(point)?, point.relmse[0]))))
     }
+}
+
+/// Points that have logarithms, from left to right.
+fn sorted(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
+    let mut curve: Vec<_> = points.filter(|(x, y)| *x > 0.0 && *y > 0.0).collect();
+    curve.sort_by(|a, b| a.0.total_cmp(&b.0));
+    curve
 }
 
 impl Point {
@@ -222,6 +263,7 @@ impl Point {
             budget,
             spp: None,
             seconds: [0.0; 3],
+            processor_seconds: [0.0; 3],
             relmse: [0.0; 3],
             relmse_trimmed: [0.0; 3],
             mse: [0.0; 3],
@@ -246,6 +288,7 @@ impl Point {
             (some(|run| run.msamples_per_second), some(|run| run.mrays_per_second), some(|run| run.efficiency));
         let [seconds, relmse, trimmed, mse] =
             [over(|run| run.seconds), over(|run| run.relmse), over(|run| run.relmse_trimmed), over(|run| run.mse)];
+        self.processor_seconds = over(|run| run.processor_seconds);
         self.flip = self.runs.iter().find_map(|run| run.flip);
         self.not_finite = self.runs.iter().map(|run| run.not_finite).sum();
         (self.spp, self.seconds, self.relmse, self.relmse_trimmed, self.mse) = (spp, seconds, relmse, trimmed, mse);
@@ -259,15 +302,16 @@ fn slope(curve: &[(f64, f64)]) -> Option<f64> {
     fitted_slope(curve).filter(|_| wide)
 }
 
-/// The times to the smallest error that every curve reaches; `None` if there are fewer than two curves with points.
-fn equal_error(curves: &[Vec<(f64, f64)>]) -> Option<EqualError> {
+/// The smallest error that every curve reaches, and the times to it; `None` if there are fewer than two curves with
+/// points.
+fn equal_error(curves: &[Vec<(f64, f64)>]) -> Option<(f64, Vec<Option<f64>>)> {
     let best = |curve: &Vec<(f64, f64)>| curve.iter().map(|p| p.1).reduce(f64::min);
     let reached: Vec<f64> = curves.iter().filter_map(best).collect();
     if reached.len() < 2 {
         return None;
     }
     let relmse = reached.into_iter().fold(0.0, f64::max);
-    Some(EqualError { relmse, seconds: curves.iter().map(|curve| time_to(curve, relmse)).collect() })
+    Some((relmse, curves.iter().map(|curve| time_to(curve, relmse)).collect()))
 }
 
 /// The time after which a curve falls to an error.
@@ -290,9 +334,9 @@ mod tests {
     fn times_to_equal_error_lie_between_points_on_logarithmic_lines() {
         let slow = vec![(1.0, 0.4), (4.0, 0.1), (16.0, 0.025)];
         let fast = vec![(0.5, 0.2), (2.0, 0.05), (8.0, 0.0125)];
-        let equal = equal_error(&[slow.clone(), fast, vec![(0.1, 0.02)]]).unwrap();
-        assert_eq!(equal.relmse, 0.025);
-        let seconds: Vec<f64> = equal.seconds.iter().map(|s| s.unwrap()).collect();
+        let (relmse, seconds) = equal_error(&[slow.clone(), fast, vec![(0.1, 0.02)]]).unwrap();
+        assert_eq!(relmse, 0.025);
+        let seconds: Vec<f64> = seconds.iter().map(|s| s.unwrap()).collect();
         for (found, expected) in seconds.iter().zip([16.0, 4.0, 0.08]) {
             assert!((found / expected - 1.0).abs() < 1e-12, "{seconds:?}");
         }
@@ -314,6 +358,7 @@ mod tests {
             spp: Some(4),
             seconds,
             process_seconds: None,
+            processor_seconds: 2.0 * seconds,
             mse: 0.0,
             relmse,
             relmse_trimmed: relmse,
@@ -329,6 +374,6 @@ mod tests {
         point.summarize();
         assert_eq!((point.spp, point.seconds, point.not_finite), (Some(4.0), [2.5, 1.0, 4.0], 4));
         assert!((point.relmse[0] - 0.15).abs() < 1e-12);
-        assert_eq!(point.efficiency.unwrap()[0], 2.0);
+        assert_eq!((point.efficiency.unwrap()[0], point.processor_seconds), (2.0, [5.0, 2.0, 8.0]));
     }
 }

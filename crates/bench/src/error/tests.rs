@@ -1,7 +1,9 @@
 use super::*;
+use crate::Spent;
 use crate::accel::{Accelerator, Coherence, EmbreeAccel, EmbreeReplay};
 use crate::math::{Ray, Rng, Vec3};
 use crate::mesh::sphere_geometry;
+use crate::report::Report;
 
 fn picture(size: [u32; 2], mut value: impl FnMut(usize) -> f32) -> Image {
     let data = (0..size[0] as usize * size[1] as usize).flat_map(|i| [value(i); 4]).collect();
@@ -10,7 +12,16 @@ fn picture(size: [u32; 2], mut value: impl FnMut(usize) -> f32) -> Image {
 
 fn measured(image: Image, seconds: f64) -> Measured {
     let samples = Some(4 * image.crop.area());
-    Measured { image, seconds, process_seconds: None, spp: Some(4), samples, rays: Some(1_000_000), dropped: 2 }
+    Measured {
+        image,
+        seconds,
+        process_seconds: None,
+        spent: Spent::default(),
+        spp: Some(4),
+        samples,
+        rays: Some(1_000_000),
+        dropped: 2,
+    }
 }
 
 fn against(image: Image, floor: [f64; 3]) -> Reference {
@@ -90,8 +101,8 @@ fn pages_hold_names_that_are_markup() {
     let external = External::new(name, "{spp} {out}", std::path::Path::new("s"), &options.budgets).unwrap();
     let variant = Variant { name: name.into(), subject: Subject::External(external) };
     report.variants = ErrorReport::new(Machine::here(), &ErrorOptions { variants: vec![variant], ..options }).variants;
-    report.pictures = Pictures::new(&image);
-    assert!(report.pictures.fit(10) && !Pictures::new(&picture([4000, 1], |_| 0.0)).fit(3000));
+    report.pictures = Pictures::new(&image).unwrap();
+    assert!(report.pictures.fit(10) && !Pictures::new(&picture([4000, 1], |_| 0.0)).unwrap().fit(3000));
     report.pictures.add(0, 1, &image);
     for budget in 0..2 {
         let run = judge(&against(image.clone(), [0.0; 3]), &measured(picture([2, 2], |i| i as f32 + 1.0), 1.0), name)
@@ -101,9 +112,10 @@ fn pages_hold_names_that_are_markup() {
     report.summarize(&[vec![Blocks::default(), Blocks::default()]]);
     let html = report.html().unwrap();
     assert!(
-        html.contains("a&lt;b&gt;&amp;&quot;") && html.matches("</script>").count() == 2 && !html.contains("<b>&\""),
+        html.contains("a&lt;b&gt;&amp;&quot;") && html.matches("</script>").count() == 3 && !html.contains("<b>&\""),
         "{html}"
     );
     assert!(html.contains("\\u003c/script>, 4 spp"));
-    assert!(report.csv().contains("\"a<b>&\"\"</script>\"") && report.markdown().contains("| 4 spp |"));
+    assert_eq!(report.sheet().unwrap().rows[0][0], name);
+    assert!(report.markdown().contains("| 4 spp |"));
 }

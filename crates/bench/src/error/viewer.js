@@ -4,6 +4,7 @@
   const [width, height] = data.size;
   const element = (id) => document.getElementById(id);
   const status = element("pixel");
+  element("viewer").hidden = false;
 
   // Values of 16 bits: first the high bytes of all, then the low ones, packed by zlib.
   const halves = new Float32Array(65536);
@@ -148,6 +149,6 @@
     show("all");
     document.body.dataset.viewer = "ready";
   } catch (error) {
-    status.textContent = `The pictures cannot be shown: ${error.message}`;
+    status.textContent = `The pictures cannot be shown (this needs DecompressionStream): ${error.message}`;
   }
 })();

@@ -1,26 +1,16 @@
-//! One page with everything, without a single address.
+//! Pages as HTML: one file, without a single address.
 
 use std::fmt::Write;
 
-use super::Report;
-use super::markdown::{self, Table};
-use super::plot::{self, Curve, Series};
+use super::{Drawing, Page, Section, Table, base64, plot};
 use crate::printable;
-use crate::{Mode, RayKind, SceneReport};
 use steradian::Result;
 
-const STYLE: &str = "
-:root { color-scheme: light dark; --line: #8884; }
-body { font: 15px/1.5 system-ui, sans-serif; max-width: 76rem; margin: 2rem auto; padding: 0 1rem; }
-h1, h2, h3 { line-height: 1.2; } h2 { margin-top: 2.5rem; border-bottom: 1px solid var(--line); }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 13px; }
-.wide { overflow-x: auto; margin: .5rem 0 1.5rem; }
-th, td { padding: .25rem .6rem; border-bottom: 1px solid var(--line); text-align: left; white-space: nowrap; }
-th { position: sticky; top: 0; background: Canvas; }
-td:not(:first-child) { font-variant-numeric: tabular-nums; }
-figure { margin: 1rem 0; } svg { max-width: 100%; height: auto; border-radius: 6px; } \
-figcaption { opacity: .8; font-size: 13px; }
-code { overflow-wrap: anywhere; }";
+const STYLE: &str = include_str!("page.css");
+const SORT: &str = include_str!("sort.js");
+
+/// Characters from which on a cell is wrapped.
+const LONG: usize = 36;
 
 /// Text with the characters of markup, and those that nobody sees, written out.
 pub fn escape(text: &str) -> String {
@@ -32,176 +22,115 @@ pub fn escape(text: &str) -> String {
         .replace('\'', "&#39;")
 }
 
-/// A page down to the line with the machine of the measurement.
-pub fn begin(title: &str, header: &str) -> String {
-    format!(
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width\">\n<title>{title}</title>\n<style>{STYLE}</style>\n\
-         </head>\n<body>\n<h1>{title}</h1>\n<p>{}</p>\n",
-        escape(header)
-    )
+/// Text in which what is between backticks is code.
+fn inline(text: &str) -> String {
+    let parts = text.split('`').enumerate();
+    parts.map(|(i, part)| if i % 2 == 1 { format!("<code>{}</code>", escape(part)) } else { escape(part) }).collect()
 }
 
-/// What ends a page.
-pub const END: &str = "</body>\n</html>\n";
-
-pub fn write(report: &Report) -> Result<String> {
-    let mut out = begin("Accelerators", &markdown::header(report));
-    for scene in &report.scenes {
-        add_scene(&mut out, scene)?;
+pub fn write(page: &Page) -> Result<String> {
+    let title = escape(&page.title);
+    let mut out = format!(
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n\
+         <link rel=\"icon\" href=\"data:,\">\n<style>\n{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n\
+         <p class=\"verdict\">{}</p>\n",
+        inline(&page.verdict)
+    );
+    // Writing to a string cannot fail.
+    for warning in &page.warnings {
+        let _ = writeln!(out, "<p class=\"warning\">{}</p>", inline(warning));
     }
-    if let (Some(scaling), Some(table)) = (&report.scaling, markdown::scaling(report)) {
-        let names: Vec<&String> = scaling.slopes.iter().map(|(name, ..)| name).collect();
-        let curve = |name: &str, slope: f64, cost: fn(&crate::ScalingPoint) -> f64| Curve {
-            name: format!("{name} (slope {slope:.2})"),
-            points: scaling.points.iter().filter(|p| p.accel == name).map(|p| (p.triangles as f64, cost(p))).collect(),
-        };
-        let slope = |name: &str| {
-            scaling.slopes.iter().find(|(n, ..)| n == name).map_or((0.0, 0.0), |(_, rays, builds)| (*rays, *builds))
-        };
-        let of_rays: Vec<_> = names.iter().map(|name| curve(name, slope(name).0, |p| p.nanoseconds_per_ray)).collect();
-        let of_builds: Vec<_> = names.iter().map(|name| curve(name, slope(name).1, |p| p.build_milliseconds)).collect();
-        out.push_str("<h2>Growth</h2>\n");
-        figure(
-            &mut out,
-            &plot::curves(&of_rays, "triangles", "ns per ray", &[])?,
-            "Time per ray, incoherent rays, one thread.",
-        );
-        figure(
-            &mut out,
-            &plot::curves(&of_builds, "triangles", "ms to build", &[])?,
-            "Time to build with all threads.",
-        );
-        add_table(&mut out, &table);
+    out.push_str("<dl class=\"facts\">\n");
+    for (name, fact) in &page.facts {
+        let _ = writeln!(out, "<div><dt>{name}</dt><dd>{}</dd></div>", inline(fact));
     }
-    out.push_str(END);
+    out.push_str("</dl>\n");
+    for section in &page.sections {
+        add_section(&mut out, section)?;
+    }
+    out.push_str(&page.viewer);
+    if !page.notes.is_empty() {
+        out.push_str("<h2>How to read it</h2>\n");
+        add_list(&mut out, &page.notes);
+    }
+    let _ = write!(out, "<script>\n{SORT}</script>\n</body>\n</html>\n");
     Ok(out)
 }
 
-fn add_scene(out: &mut String, scene: &SceneReport) -> Result<()> {
-    let _ = write!(out, "<h2>{}</h2>\n<p>{}</p>\n", escape(&scene.scene), escape(&markdown::scene_line(scene)));
-    let kinds: Vec<RayKind> = scene.rays.iter().map(|(kind, _)| *kind).collect();
-    let groups: Vec<&str> = kinds.iter().map(|kind| kind.name()).collect();
-    figure(
-        out,
-        &plot::bars(&groups, &rates(scene, &kinds), "Mrays/s")?,
-        "One thread; whiskers from the lowest to the highest round.",
-    );
-    for kind in [RayKind::FirstBounce, RayKind::Camera] {
-        if let Some((svg, caption)) = break_even(scene, kind)? {
-            figure(out, &svg, &caption);
-            break;
-        }
+fn add_section(out: &mut String, section: &Section) -> Result<()> {
+    if !section.title.is_empty() {
+        let _ = writeln!(out, "<h2>{}</h2>", inline(&section.title));
     }
-    for table in markdown::tables(scene) {
-        add_table(out, &table);
+    for text in &section.text {
+        let _ = writeln!(out, "<p>{}</p>", inline(text));
     }
-    let lines = markdown::disagreements(scene);
-    if !lines.is_empty() {
-        out.push_str("<h3>Disagreements</h3>\n<ul>\n");
-        for line in lines {
-            let _ = writeln!(out, "<li><code>{}</code></li>", escape(&line));
-        }
-        out.push_str("</ul>\n");
+    out.push_str("<div class=\"figures\">\n");
+    for figure in &section.figures {
+        let (class, drawn) = match &figure.drawing {
+            Drawing::Curves(curves) => ("plot", plot::curves(curves)),
+            Drawing::Dots(dots) => ("plot", plot::dots(dots)),
+            Drawing::Pictures(pictures) => {
+                let picture = |p: &super::Picture| {
+                    let (name, data) = (inline(&p.name), base64(&p.png));
+                    let alt = escape(&p.name);
+                    format!(
+                        "<figure><img alt=\"{alt}\" src=\"data:image/png;base64,{data}\">\
+                         <figcaption>{name}</figcaption></figure>\n"
+                    )
+                };
+                ("pictures", pictures.iter().map(picture).collect())
+            }
+        };
+        let caption = inline(&figure.caption);
+        let _ = write!(
+            out,
+            "<figure class=\"{class}\"><div>\n{drawn}\n</div><figcaption>{caption}</figcaption></figure>\n"
+        );
     }
+    out.push_str("</div>\n");
+    section.tables.iter().for_each(|table| add_table(out, &table.compact()));
+    add_list(out, &section.remarks);
     Ok(())
 }
 
-/// Single rays of every accelerator, and batches where there are any.
-fn rates(scene: &SceneReport, kinds: &[RayKind]) -> Vec<Series> {
-    let mut series = Vec::new();
-    for accel in &scene.accels {
-        for mode in [Mode::Single, Mode::Batch, Mode::CoherentBatch] {
-            let value = |kind: &RayKind| {
-                let report = accel.kinds.iter().find(|k| k.kind == *kind)?;
-                let rate = report.rates.iter().find(|r| r.mode == mode && r.threads == 1)?;
-                Some(rate.mrays_per_second)
-            };
-            let values: Vec<_> = kinds.iter().map(value).collect();
-            if values.iter().any(Option::is_some) {
-                let name =
-                    if mode == Mode::Single { accel.name.clone() } else { format!("{}, {}", accel.name, mode.name()) };
-                series.push(Series { name, values });
-            }
-        }
+fn add_list(out: &mut String, items: &[String]) {
+    if !items.is_empty() {
+        let items: String = items.iter().map(|item| format!("<li>{}</li>\n", inline(item))).collect();
+        let _ = write!(out, "<ul>\n{items}</ul>\n");
     }
-    series
 }
 
-/// Time to build and then trace a number of rays, on one thread each, with the numbers at which one accelerator
-/// overtakes another.
-fn break_even(scene: &SceneReport, kind: RayKind) -> Result<Option<(String, String)>> {
-    let mut lines = Vec::new();
-    for accel in &scene.accels {
-        let build = accel.builds.iter().find(|b| b.threads == 1).map(|b| b.milliseconds[0] * 1e-3);
-        let report = accel.kinds.iter().find(|k| k.kind == kind);
-        let rate = report
-            .and_then(|k| k.rates.iter().find(|r| r.mode == Mode::Single && r.threads == 1))
-            .map(|r| r.mrays_per_second[0] * 1e6);
-        if let (Some(build), Some(rate)) = (build, rate.filter(|r| *r > 0.0)) {
-            lines.push((accel.name.clone(), Cost { build, per_ray: 1.0 / rate }));
-        }
-    }
-    if lines.is_empty() {
-        return Ok(None);
-    }
-    let (first, last) = (1e3, 1e10);
-    let mut marks = Vec::new();
-    let mut crossings = Vec::new();
-    for (i, a) in lines.iter().enumerate() {
-        for b in &lines[i + 1..] {
-            if let Some(n) = crossing(a.1, b.1).filter(|n| (first..last).contains(n)) {
-                marks.push((n, a.1.of_rays(n)));
-                let (slow, fast) = if a.1.per_ray < b.1.per_ray { (b, a) } else { (a, b) };
-                crossings.push(format!("{} overtakes {} at {n:.2e} rays", fast.0, slow.0));
-            }
-        }
-    }
-    let curves: Vec<_> = lines
-        .iter()
-        .map(|(name, cost)| Curve {
-            name: name.clone(),
-            points: (0..=70).map(|i| first * 10f64.powf(f64::from(i) / 10.0)).map(|n| (n, cost.of_rays(n))).collect(),
-        })
+/// Adds a table below its title. Columns of numbers are set flush right; a cell that is a verdict has its class.
+fn add_table(out: &mut String, table: &Table) {
+    let is_numeric =
+        |text: &str| text == "-" || text.trim_start_matches(['-', '+']).starts_with(|c: char| c.is_ascii_digit());
+    let numeric: Vec<bool> = (0..table.heads.len())
+        .map(|i| table.rows.iter().filter_map(|row| row.get(i)).all(|cell| cell.is_empty() || is_numeric(cell)))
         .collect();
-    let svg = plot::curves(&curves, "rays", "seconds to build and trace", &marks)?;
-    let ends = if crossings.is_empty() { "no lines cross".to_owned() } else { crossings.join("; ") };
-    Ok(Some((svg, format!("Build and trace {} rays on one thread: {ends}.", kind.name()))))
-}
-
-/// Seconds of an accelerator.
-#[derive(Clone, Copy)]
-struct Cost {
-    build: f64,
-    per_ray: f64,
-}
-
-impl Cost {
-    fn of_rays(self, n: f64) -> f64 {
-        self.build + n * self.per_ray
-    }
-}
-
-/// The number of rays after which `build + rays * per_ray` is the same for both; `None` if it never is.
-fn crossing(a: Cost, b: Cost) -> Option<f64> {
-    let n = (b.build - a.build) / (a.per_ray - b.per_ray);
-    (n.is_finite() && n > 0.0).then_some(n)
-}
-
-/// Adds a plot with its caption.
-pub fn figure(out: &mut String, svg: &str, caption: &str) {
-    let _ = write!(out, "<figure>\n{svg}\n<figcaption>{}</figcaption>\n</figure>\n", escape(caption));
-}
-
-/// Adds a table below its title.
-pub fn add_table(out: &mut String, table: &Table) {
-    let cells = |tag: &str, row: &[String]| {
-        row.iter().map(|cell| format!("<{tag}>{}</{tag}>", escape(cell))).collect::<String>()
+    let cell = |tag: &str, i: usize, text: &String| {
+        let mut class = Vec::new();
+        if numeric.get(i) == Some(&true) {
+            class.push("n");
+        }
+        if text.chars().count() > LONG {
+            class.push("long");
+        }
+        class.extend(match text.as_str() {
+            "passed" | "none found" => Some("good"),
+            "short" => Some("mild"),
+            "failed" | "found" => Some("bad"),
+            _ => None,
+        });
+        let class = if class.is_empty() { String::new() } else { format!(" class=\"{}\"", class.join(" ")) };
+        format!("<{tag}{class}>{}</{tag}>", inline(text))
     };
+    let cells =
+        |tag: &str, row: &[String]| row.iter().enumerate().map(|(i, text)| cell(tag, i, text)).collect::<String>();
+    let title = if table.title.is_empty() { String::new() } else { format!("<h3>{}</h3>\n", inline(&table.title)) };
     let _ = write!(
         out,
-        "<h3>{}</h3>\n<div class=\"wide\"><table>\n<thead><tr>{}</tr></thead>\n<tbody>\n",
-        escape(&table.title),
+        "{title}<div class=\"wide\" tabindex=\"0\"><table>\n<thead><tr>{}</tr></thead>\n<tbody>\n",
         cells("th", &table.heads)
     );
     for row in &table.rows {
@@ -212,7 +141,9 @@ pub fn add_table(out: &mut String, table: &Table) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Curve, Curves, Dots, Figure, Picture};
     use super::*;
+    use crate::{Machine, Spent};
 
     #[test]
     fn text_is_no_markup() {
@@ -221,34 +152,58 @@ mod tests {
             escape(strange),
             "&lt;/title&gt;&lt;script&gt;alert(&#39;x&#39;)&lt;/script&gt;&quot; onload=&quot;&amp;\\u001b"
         );
-        let mut page = begin(&escape(strange), strange);
-        let table = Table { title: strange.into(), heads: vec![strange.into()], rows: vec![vec![strange.into()]] };
-        add_table(&mut page, &table);
-        figure(
-            &mut page,
-            &plot::curves(
-                &[Curve { name: strange.into(), points: vec![(1.0, 2.0), (2.0, 3.0)] }],
-                strange,
-                strange,
-                &[],
-            )
-            .unwrap(),
-            strange,
-        );
+        let mut page = Page::new(strange, &Machine::here(), &Spent::default());
+        (page.verdict, page.warnings, page.notes) = (strange.into(), vec![strange.into()], vec![strange.into()]);
+        let curve = Curve::new(strange, [(1.0, 2.0), (2.0, 3.0)]);
+        let curves = Curves { x: strange.into(), y: strange.into(), curves: vec![curve], marks: Vec::new() };
+        let rows = vec![(strange.to_owned(), [1.0, 0.5, 2.0])];
+        let dots = Dots { unit: strange.into(), groups: vec![(strange.into(), rows)], mark: None };
+        let pictures = vec![Picture { name: strange.into(), png: Vec::new() }];
+        let drawings = [Drawing::Curves(curves), Drawing::Dots(dots), Drawing::Pictures(pictures)];
+        page.sections.push(Section {
+            title: strange.into(),
+            text: vec![strange.into()],
+            figures: drawings.map(|drawing| Figure { caption: strange.into(), drawing }).into(),
+            tables: vec![Table {
+                title: strange.into(),
+                heads: vec![strange.into()],
+                rows: vec![vec![strange.into()]],
+            }],
+            remarks: vec![strange.into()],
+        });
+        let text = write(&page).unwrap();
         assert!(
-            !page.contains("<script") && !page.contains("onload=\"") && page.matches("</title>").count() == 1,
-            "{page}"
+            text.matches("<script").count() == 1 && !text.contains("</title><") && !text.contains('\u{1b}'),
+            "{text}"
+        );
+        // As text, and as values of attributes.
+        let escaped = "&lt;/title&gt;&lt;script&gt;alert(";
+        for place in [
+            "<title>",
+            "<h1>",
+            "<figcaption>",
+            "<th class",
+            "<td class",
+            "<li>",
+            "alt=\"",
+            "aria-label=\"",
+            "class=\"row\"",
+        ] {
+            assert!(text.contains(place), "{place}");
+        }
+        assert!(
+            text.matches(escaped).count() > 12 && !text.contains("alt=\"<") && !text.contains("label=\"<"),
+            "{text}"
         );
     }
 
     #[test]
-    fn lines_cross_where_both_have_cost_the_same() {
-        let crossing = |a: [f64; 2], b: [f64; 2]| {
-            let [a, b] = [a, b].map(|[build, per_ray]| Cost { build, per_ray });
-            crossing(a, b)
-        };
-        assert_eq!(crossing([0.0, 2.0], [10.0, 1.0]), Some(10.0));
-        assert_eq!(crossing([0.0, 1.0], [10.0, 2.0]), None);
-        assert_eq!(crossing([5.0, 1.0], [10.0, 1.0]), None);
+    fn code_has_no_backticks_and_numbers_are_flush_right() {
+        assert_eq!(inline("run `a < b` now"), "run <code>a &lt; b</code> now");
+        let mut out = String::new();
+        let row = |cells: [&str; 3]| cells.map(str::to_owned).to_vec();
+        let rows = vec![row(["passed", "-1.5 (-2 to 1)", "x"]), row(["failed", "-", "3"])];
+        add_table(&mut out, &Table { rows, ..Table::new("", "verdict | value | text") });
+        assert!(out.contains("<td class=\"good\">passed</td><td class=\"n\">-1.5 (-2 to 1)</td><td>x</td>"), "{out}");
     }
 }

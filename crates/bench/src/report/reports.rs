@@ -1,90 +1,48 @@
-//! The comparisons of reports, as Markdown and as a page.
+//! The report of `bench reports`.
 
-use std::fmt::Write;
-use std::path::Path;
+use super::{Dots, Drawing, Figure, Page, Report, Section, Table, interrupted, or_dash, range};
+use crate::{Comparison, ComparisonRow, FrameTiming, ReportsReport};
 
-use super::html::{self, add_table, escape, figure};
-use super::markdown::{self, Table, range};
-use super::plot::{self, Series};
-use super::write_files;
-use crate::{Comparison, ComparisonRow, ReportsReport};
-use steradian::{Error, Result};
+impl Report for ReportsReport {
+    const NAME: &'static str = "reports";
 
-const TITLE: &str = "What reports say of accelerators, repeated";
+    fn page(&self) -> Page {
+        let mut page = Page::new("What reports say of accelerators, repeated", &self.machine, &self.spent);
+        page.verdict = self.verdict();
+        page.warnings.extend(interrupted(self.interrupted));
+        let [width, height] = self.size;
+        page.facts.push(("Frames", format!("{width}x{height}, one sample a pixel, one thread")));
+        page.notes = vec![
+            "Pictures of normals have one camera ray a pixel; path traced ones show the mesh on a floor under a sky \
+             and a sun (up to 5 segments, shadow rays). Times are medians of frames in turn (lowest to highest)."
+                .to_owned(),
+            "Times faster: the first line's time within the accelerator over this one's. Triangles per ray and \
+             different pixels are of normals."
+                .to_owned(),
+        ];
+        page.sections.extend(self.comparisons.iter().map(of_comparison));
+        page
+    }
+}
 
 impl ReportsReport {
-    /// As JSON.
-    ///
-    /// # Errors
-    /// None in practice.
-    pub fn json(&self) -> Result<String> {
-        serde_json::to_string_pretty(self).map_err(|e| Error::Internal(e.to_string()))
-    }
-
-    /// Tables, each with where the figures are from and the sentences that explain its ratios.
-    pub fn markdown(&self) -> String {
-        let mut out = format!("# {TITLE}\n\n{}\n", header(self));
-        for comparison in &self.comparisons {
-            let _ = writeln!(out, "\n## {}\n\nReported: {}\n", comparison.title, comparison.claim);
-            for source in &comparison.sources {
-                let _ = writeln!(out, "- {source}");
-            }
-            markdown::add(&mut out, &table(comparison));
-            out.push('\n');
-            for reason in &comparison.reasons {
-                let _ = writeln!(out, "- {reason}");
-            }
+    /// How many times faster than the linear loop the report's accelerator is here, and what it was said to be.
+    fn verdict(&self) -> String {
+        let part = |comparison: &Comparison| {
+            let ratios = times_faster(comparison, |row| row.normals.accel_seconds);
+            let quoted = |(row, ratio): (&ComparisonRow, &f64)| {
+                let reported = row.reported.filter(|_| ratio.is_finite())?;
+                Some(format!("{} {ratio:.1}x (reported: {reported})", row.name))
+            };
+            let quoted: Vec<String> = comparison.rows.iter().zip(&ratios).skip(1).filter_map(quoted).collect();
+            (!quoted.is_empty()).then(|| format!("{}: {}", comparison.title, quoted.join(", ")))
+        };
+        let parts: Vec<String> = self.comparisons.iter().filter_map(part).collect();
+        if parts.is_empty() {
+            return "Nothing was measured.".to_owned();
         }
-        out
+        format!("Speed over the linear loop, within the accelerator. {}.", parts.join("; "))
     }
-
-    /// One page with plots.
-    ///
-    /// # Errors
-    /// If a plot cannot be drawn.
-    pub fn html(&self) -> Result<String> {
-        let mut out = html::begin(TITLE, &header(self));
-        for comparison in &self.comparisons {
-            let _ =
-                write!(out, "<h2>{}</h2>\n<p>Reported: {}</p>\n", escape(comparison.title), escape(comparison.claim));
-            add_list(&mut out, &comparison.sources);
-            let caption =
-                "How many times faster than the first accelerator, within the accelerator, on a logarithmic axis.";
-            figure(&mut out, &ratios(comparison)?, caption);
-            add_table(&mut out, &table(comparison));
-            add_list(&mut out, &comparison.reasons);
-        }
-        out.push_str(html::END);
-        Ok(out)
-    }
-
-    /// Writes `reports.json`, `reports.md` and `reports.html` into a folder, which is made if it does not exist.
-    ///
-    /// # Errors
-    /// [`Error::Output`] naming the file.
-    pub fn write_to(&self, folder: &Path) -> Result<()> {
-        write_files(
-            folder,
-            &[("reports.json", self.json()?), ("reports.md", self.markdown()), ("reports.html", self.html()?)],
-        )
-    }
-}
-
-fn header(report: &ReportsReport) -> String {
-    let m = &report.machine;
-    let load = m.load.map_or(String::new(), |load| format!(", load {load:.2} before"));
-    let [width, height] = report.size;
-    format!(
-        "{} ({}{load}), steradian {}. Frames of {width}x{height}, one sample a pixel, one thread: pictures of normals \
-         (one camera ray a pixel), and path tracing of the mesh on a floor under a sky and a sun (up to 5 segments, \
-         shadow rays). Medians of frames in turn.",
-        m.processor, m.instruction_set, m.version
-    )
-}
-
-fn add_list(out: &mut String, lines: &[String]) {
-    let items: String = lines.iter().map(|line| format!("<li>{}</li>\n", escape(line))).collect();
-    let _ = write!(out, "<ul>\n{items}</ul>\n");
 }
 
 /// How many times faster than the first accelerator each is, within the accelerator.
@@ -93,61 +51,49 @@ fn times_faster(comparison: &Comparison, accel_seconds: fn(&ComparisonRow) -> f6
     comparison.rows.iter().map(|row| first / accel_seconds(row)).collect()
 }
 
-fn ratios(comparison: &Comparison) -> Result<String> {
-    let kinds = [
-        times_faster(comparison, |row| row.normals.accel_seconds),
-        times_faster(comparison, |row| row.paths.accel_seconds),
-    ];
-    let bar = |ratio: f64| Some([ratio; 3]).filter(|_| ratio.is_finite() && ratio > 0.0);
-    let series = |(i, row): (usize, &ComparisonRow)| Series {
-        name: row.name.clone(),
-        values: kinds.iter().map(|kind| bar(kind[i])).collect(),
-    };
-    let series: Vec<_> = comparison.rows.iter().enumerate().map(series).collect();
-    plot::log_bars(&["normals", "path traced"], &series, "times faster")
-}
-
-fn table(comparison: &Comparison) -> Table {
-    let heads = [
-        "accelerator",
-        "reported",
-        "build ms",
-        "normals: frame s",
-        "accelerator s",
-        "times faster",
-        "path traced: frame s",
-        "accelerator s",
-        "times faster",
-        "triangles per ray",
-        "different pixels",
-    ];
+fn of_comparison(comparison: &Comparison) -> Section {
     let [of_normals, of_paths] = [
         times_faster(comparison, |row| row.normals.accel_seconds),
         times_faster(comparison, |row| row.paths.accel_seconds),
     ];
-    let rows = comparison.rows.iter().enumerate().map(|(i, row)| {
-        let frame = |timing: &crate::FrameTiming| {
-            let scaled = timing.scaled_from.map_or(String::new(), |[w, h]| format!(", from {w}x{h}"));
-            format!("{}{scaled}", range(timing.frame_seconds))
-        };
-        vec![
-            row.name.clone(),
-            row.reported.unwrap_or("").to_owned(),
-            format!("{:.2}", row.build_milliseconds),
-            frame(&row.normals),
-            format!("{:.4}", row.normals.accel_seconds),
-            format!("{:.1}", of_normals[i]),
-            frame(&row.paths),
-            format!("{:.4}", row.paths.accel_seconds),
-            format!("{:.1}", of_paths[i]),
-            row.tests_per_ray.map_or("-".to_owned(), |tests| format!("{tests:.1}")),
-            row.different_pixels.to_string(),
-        ]
-    });
-    let title = format!(
-        "{} triangles; times faster: the first line's time within the accelerator over this one's; triangles per ray \
-         and different pixels are of normals.",
-        comparison.triangles
+    let group = |name: &str, ratios: &[f64]| {
+        let rows = comparison.rows.iter().zip(ratios).filter(|(_, ratio)| ratio.is_finite() && **ratio > 0.0);
+        (name.to_owned(), rows.map(|(row, ratio)| (row.name.clone(), [*ratio; 3])).collect())
+    };
+    let groups = vec![group("normals", &of_normals), group("path traced", &of_paths)];
+    let dots = Dots { unit: "times faster".to_owned(), groups, mark: Some(1.0) };
+    let caption = "How many times faster than the first accelerator, within the accelerator.".to_owned();
+    let text = std::iter::once(format!("Reported: {}", comparison.claim)).chain(comparison.sources.iter().cloned());
+    Section {
+        title: comparison.title.to_owned(),
+        text: text.collect(),
+        figures: vec![Figure { caption, drawing: Drawing::Dots(dots) }],
+        tables: vec![table(comparison, &of_normals, &of_paths)],
+        remarks: comparison.reasons.clone(),
+    }
+}
+
+fn table(comparison: &Comparison, of_normals: &[f64], of_paths: &[f64]) -> Table {
+    let mut table = Table::new(
+        format!("{} triangles", comparison.triangles),
+        "accelerator | reported | build ms | normals: frame s | processor s | accelerator s | times faster | path \
+         traced: frame s | processor s | accelerator s | times faster | triangles per ray | different pixels",
     );
-    Table { title, heads: heads.map(str::to_owned).to_vec(), rows: rows.collect() }
+    for ((row, of_normals), of_paths) in comparison.rows.iter().zip(of_normals).zip(of_paths) {
+        let cells = |timing: &FrameTiming, ratio: f64| {
+            let scaled = timing.scaled_from.map_or(String::new(), |[w, h]| format!(", from {w}x{h}"));
+            [
+                format!("{}{scaled}", range(timing.frame_seconds)),
+                format!("{:.3}", timing.processor_seconds),
+                format!("{:.4}", timing.accel_seconds),
+                format!("{ratio:.1}"),
+            ]
+        };
+        let lead =
+            [row.name.clone(), or_dash(row.reported.map(str::to_owned)), format!("{:.2}", row.build_milliseconds)];
+        let tests = or_dash(row.tests_per_ray.map(|tests| format!("{tests:.1}")));
+        let end = [tests, row.different_pixels.to_string()];
+        table.rows.push([&lead[..], &cells(&row.normals, *of_normals), &cells(&row.paths, *of_paths), &end].concat());
+    }
+    table
 }

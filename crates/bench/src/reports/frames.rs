@@ -14,11 +14,12 @@ use crate::desc::SceneDesc;
 use crate::film::{Image, LayerKind};
 use crate::geometry::Mesh;
 use crate::import::parse_scene;
+use crate::machine::processor_seconds;
 use crate::math::Ray;
 use crate::observed::{Call, Observed, Observer};
 use crate::render::{self, Overrides, Settings, Silent};
 use crate::scene::Scene;
-use crate::{Watch, median_and_range};
+use crate::{Spent, Watch, median_and_range};
 use steradian::Result;
 
 /// Rays whose primitive tests are counted, about.
@@ -78,16 +79,17 @@ pub struct Found {
     pub different_pixels: usize,
 }
 
-/// Renders a frame on one thread; the seconds of the render, and its picture.
-fn frame(desc: &SceneDesc, scene: &Scene, size: [u32; 2], accel: &dyn Accelerator) -> Result<(f64, Image)> {
+/// Renders a frame on one thread; what the render took, and its picture.
+fn frame(desc: &SceneDesc, scene: &Scene, size: [u32; 2], accel: &dyn Accelerator) -> Result<(Spent, Image)> {
     let overrides = Overrides {
         size: Some(size),
         threads: Some(1),
         default_outputs: vec!["unused.png".into()],
         ..Overrides::default()
     };
+    let before = processor_seconds();
     let result = render::render(scene, accel, &Settings::new(desc, &overrides)?, &Silent, &AtomicBool::new(false))?;
-    Ok((result.stats.render_seconds, result.image))
+    Ok((Spent::new(1, result.stats.render_seconds, processor_seconds() - before), result.image))
 }
 
 /// A comparison of accelerators on a mesh.
@@ -100,8 +102,8 @@ pub struct FrameBenchmark<'a> {
     pub watch: &'a dyn Watch,
 }
 
-/// Times every accelerator on frames of a kind; fewer if it is stopped.
-pub fn measure(comparison: FrameBenchmark, kind: Kind) -> Result<Vec<Found>> {
+/// Times every accelerator on frames of a kind; fewer if it is stopped. Also what all frames took.
+pub fn measure(comparison: FrameBenchmark, kind: Kind) -> Result<(Vec<Found>, Spent)> {
     let FrameBenchmark { title, mesh, entries, options, watch } = comparison;
     let full = u64::from(options.size[0]) * u64::from(options.size[1]);
     // The smallest divisor of the sides that keeps a linear frame within its budget.
@@ -124,7 +126,8 @@ pub fn measure(comparison: FrameBenchmark, kind: Kind) -> Result<Vec<Found>> {
     // The BVH answers as the linear loop does, which would take too long for full frames.
     let oracle = accel::build(AccelKind::Bvh(accel::BvhOptions::default()), &scene.geometry, 1)?;
     let pictures = [frame(sizes[0], &*oracle)?.1, frame(sizes[1], &*oracle)?.1];
-    let mut times = vec![(Vec::new(), Vec::new()); entries.len()];
+    let mut times = vec![[const { Vec::new() }; 3]; entries.len()];
+    let mut all = Spent::default();
     let (mut different, mut tests) = (vec![0; entries.len()], vec![None; entries.len()]);
     for round in 0..options.rounds.max(1) {
         for (i, (Entry(accel, _, is_linear, _), (subject, _))) in entries.iter().zip(&subjects).enumerate() {
@@ -134,11 +137,13 @@ pub fn measure(comparison: FrameBenchmark, kind: Kind) -> Result<Vec<Found>> {
             watch.step(&format!("{title}, {name}: {accel}, round {} of {}", round + 1, options.rounds));
             let observed = Observed { inner: &*subject.accel, observer: Timer::default() };
             let which = usize::from(*is_linear);
-            let (seconds, image) = frame(sizes[which], &observed)?;
+            let (spent, image) = frame(sizes[which], &observed)?;
+            all.add(spent);
             let timed = observed.observer.0.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
             let scale = full as f64 / (f64::from(sizes[which][0]) * f64::from(sizes[which][1]));
-            times[i].0.push(seconds * scale);
-            times[i].1.push(timed.seconds * scale);
+            for (times, seconds) in times[i].iter_mut().zip([spent.seconds, spent.processor_seconds, timed.seconds]) {
+                times.push(seconds * scale);
+            }
             if round == 0 {
                 different[i] = different_pixels(&image, &pictures[which]);
                 let step = (timed.rays.len() / COUNTED).max(1);
@@ -151,14 +156,15 @@ pub fn measure(comparison: FrameBenchmark, kind: Kind) -> Result<Vec<Found>> {
     let found = |i: usize| Found {
         build_milliseconds: subjects[i].1,
         timing: FrameTiming {
-            frame_seconds: median_and_range(&times[i].0),
-            accel_seconds: median_and_range(&times[i].1)[0],
+            frame_seconds: median_and_range(&times[i][0]),
+            processor_seconds: median_and_range(&times[i][1])[0],
+            accel_seconds: median_and_range(&times[i][2])[0],
             scaled_from: (entries[i].2 && divisor > 1).then_some(sizes[1]),
         },
         tests_per_ray: tests[i],
         different_pixels: different[i],
     };
-    Ok((0..entries.len()).take_while(|i| !times[*i].0.is_empty()).map(found).collect())
+    Ok(((0..entries.len()).take_while(|i| !times[*i][0].is_empty()).map(found).collect(), all))
 }
 
 fn different_pixels(a: &Image, b: &Image) -> usize {

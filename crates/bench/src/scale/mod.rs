@@ -77,6 +77,7 @@ mod tests {
     use super::*;
     use crate::Unwatched;
     use crate::accel::AccelKind;
+    use crate::report::Report;
 
     fn options(sweep: &str) -> ScaleOptions {
         ScaleOptions {

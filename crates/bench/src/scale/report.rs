@@ -1,26 +1,14 @@
-//! What was found, as JSON, CSV, Markdown and a page with plots.
-
-use std::fmt::Write as _;
-use std::path::Path;
+//! The report of `bench scale`.
 
 use serde::Serialize;
 
 use super::plan::{Case, ScaleOptions, Sweep};
 use super::quantity::Quantity;
 use super::run::Measured;
-use crate::report::csv::field;
-use crate::report::html;
-use crate::report::markdown::{self, Table, number, range};
-use crate::report::plot::{self, Curve};
-use crate::report::write_files;
-use crate::{Fit, Machine, fit, median_and_range};
-use steradian::{Error, Result};
-
-/// The columns of the CSV file.
-const COLUMNS: &str = "sweep,at,repeat,width,height,spp,depth,threads,accelerator,triangles,instances,lights,\
-                       load_seconds,build_seconds,first_pass_seconds,render_seconds,processor_seconds,samples,rays,\
-                       mesh_bytes,accelerator_bytes,film_bytes_per_pixel,start_bytes,made_bytes,load_peak_bytes,\
-                       build_peak_bytes,before_render_bytes,render_peak_bytes";
+use crate::report::{
+    Curve, Curves, Drawing, Figure, Page, Report, Section, Table, count, interrupted, number, or_dash, range,
+};
+use crate::{Fit, Machine, Spent, fit, median_and_range};
 
 /// What the sweep over threads is judged by.
 const SPEEDUP: &str = "times one thread";
@@ -149,7 +137,8 @@ impl ScaleReport {
             }
             let law = |quantity: &Quantity| {
                 let name = quantity.name();
-                Some(SlopeReport { name, fit: fit(&report.curve(name))? })
+                let points: Vec<_> = report.curve(name).into_iter().map(|(x, y)| (x, y[0])).collect();
+                Some(SlopeReport { name, fit: fit(&points)? })
             };
             report.slopes = sweep.fitted.iter().filter_map(law).collect();
         }
@@ -165,178 +154,138 @@ impl ScaleReport {
             .collect()
     }
 
-    /// The sweeps of which anything was measured.
-    fn measured(&self) -> impl Iterator<Item = &SweepReport> {
-        self.sweeps.iter().filter(|sweep| sweep.points.iter().any(|point| !point.runs.is_empty()))
-    }
-
-    /// As JSON.
-    ///
-    /// # Errors
-    /// None in practice.
-    pub fn json(&self) -> Result<String> {
-        serde_json::to_string_pretty(self).map_err(|e| Error::Internal(e.to_string()))
-    }
-
-    /// One line a run.
-    pub fn csv(&self) -> String {
-        let mut out = format!("{COLUMNS}\n");
-        for sweep in &self.sweeps {
-            for point in &sweep.points {
-                for (repeat, run) in point.runs.iter().enumerate() {
-                    let Case { size: [width, height], spp, depth, threads, accel, .. } = &point.case;
-                    let lead = [
-                        sweep.name.to_owned(),
-                        point.at.to_string(),
-                        repeat.to_string(),
-                        width.to_string(),
-                        height.to_string(),
-                    ];
-                    let how = [spp.to_string(), depth.to_string(), threads.to_string(), field(accel)];
-                    let counts = [run.triangles, run.instances, run.lights].map(|n| n.to_string());
-                    let seconds = [
-                        run.load_seconds,
-                        run.build_seconds,
-                        run.first_pass_seconds,
-                        run.render_seconds,
-                        run.processor_seconds,
-                    ];
-                    let sizes =
-                        [run.samples, run.rays, run.mesh_bytes, run.accelerator_bytes, run.film_bytes_per_pixel];
-                    let memory = run.memory.map(|m| [m.start, m.made, m.load, m.build, m.before_render, m.render]);
-                    let memory = memory.map_or([""; 6].map(str::to_owned), |bytes| bytes.map(|n| n.to_string()));
-                    let cells = lead.into_iter().chain(how).chain(counts).chain(seconds.map(|s| s.to_string()));
-                    let cells: Vec<String> = cells.chain(sizes.map(|n| n.to_string())).chain(memory).collect();
-                    // Writing to a string cannot fail.
-                    let _ = writeln!(out, "{}", cells.join(","));
-                }
-            }
+    /// What all renders took.
+    fn spent(&self) -> Spent {
+        let mut spent = Spent::default();
+        for point in self.sweeps.iter().flat_map(|sweep| &sweep.points) {
+            let threads = point.case.threads;
+            let of = |run: &Measured| Spent::new(threads, run.render_seconds, run.processor_seconds);
+            point.runs.iter().for_each(|run| spent.add(of(run)));
         }
-        out
+        spent
     }
 
-    /// Tables with what they were measured on.
-    pub fn markdown(&self) -> String {
-        let mut out = format!("# Memory and scale\n\n{}\n\n", self.header());
-        for note in self.notes() {
-            let _ = writeln!(out, "- {note}");
-        }
-        markdown::add(&mut out, &self.laws());
-        for sweep in self.measured() {
-            markdown::add(&mut out, &sweep.table());
-        }
-        out
-    }
-
-    /// One page with plots.
-    ///
-    /// # Errors
-    /// If a plot cannot be drawn.
-    pub fn html(&self) -> Result<String> {
-        let mut out = html::begin("Memory and scale", &self.header());
-        out.push_str("<ul>\n");
-        for note in self.notes() {
-            let _ = writeln!(out, "<li>{}</li>", html::escape(&note));
-        }
-        out.push_str("</ul>\n");
-        html::add_table(&mut out, &self.laws());
-        for sweep in self.measured() {
-            let _ = writeln!(out, "<h2>{}</h2>", html::escape(sweep.name));
-            let curves = sweep.curves();
-            if !curves.is_empty() {
-                html::figure(&mut out, &plot::curves(&curves, sweep.axis, "times the first", &[])?, &sweep.what);
-            }
-            html::add_table(&mut out, &sweep.table());
-        }
-        out.push_str(html::END);
-        Ok(out)
-    }
-
-    /// Writes `scale.json`, `scale.csv` and `scale.md` into a folder, which is made if it does not exist.
-    ///
-    /// # Errors
-    /// [`Error::Output`] naming the file.
-    pub fn write_figures_to(&self, folder: &Path) -> Result<()> {
-        write_files(folder, &[("scale.json", self.json()?), ("scale.csv", self.csv()), ("scale.md", self.markdown())])
-    }
-
-    /// Writes everything: those, and `scale.html`.
-    ///
-    /// # Errors
-    /// [`Error::Output`] naming the file.
-    pub fn write_to(&self, folder: &Path) -> Result<()> {
-        self.write_figures_to(folder)?;
-        write_files(folder, &[("scale.html", self.html()?)])
-    }
-
-    fn header(&self) -> String {
-        let cut = if self.interrupted { " Interrupted: what is missing was not measured." } else { "" };
-        format!(
-            "{}; `{}`. Medians of {} repeats in turn (lowest to highest).{cut}",
-            self.machine.line(),
-            self.command,
-            self.repeats
-        )
-    }
-
-    /// What the columns mean.
-    fn notes(&self) -> Vec<String> {
-        let fixed = [
-            "Every case runs in a process of its own; scenes are made in memory first, which no time includes. Peak: \
-             the most memory that the process held from then on, the made meshes and the program itself included.",
-            "Load: from the description to placed and checked meshes and lights. First picture: load, build and the \
-             first sample of every pixel. Processor ns: of all threads together.",
-            "Slopes: exponents of power laws, by least squares of the logarithms of the medians, with their standard \
-             errors. 0 costs nothing more, 1 is in proportion.",
-        ];
-        fixed
-            .iter()
-            .map(|note| (*note).to_owned())
-            .chain(self.failures().iter().map(|failure| format!("Failed: {failure}")))
-            .collect()
+    fn verdict(&self) -> String {
+        let laws = || self.sweeps.iter().flat_map(|sweep| sweep.slopes.iter().map(move |law| (sweep, law)));
+        let Some((sweep, steepest)) = laws().max_by(|a, b| a.1.fit.slope.total_cmp(&b.1.fit.slope)) else {
+            return "Nothing was measured.".to_owned();
+        };
+        // Two standard errors are an interval of about 95 %.
+        let is_steep = |law: &SlopeReport| law.fit.slope - 2.0 * law.fit.standard_error.unwrap_or(0.0) > 1.0;
+        let (steep, all) = (laws().filter(|(_, law)| is_steep(law)).count(), laws().count());
+        let (name, axis, text) = (steepest.name, sweep.axis, steepest.text());
+        let grows = if steep == 0 {
+            format!("None of {all} costs grows faster than in proportion")
+        } else {
+            format!("{steep} of {all} costs grow faster than in proportion")
+        };
+        format!("{grows}; the steepest is {name} over {axis}, with slope {text}.")
     }
 
     /// How costs grow.
     fn laws(&self) -> Table {
-        let mut rows = Vec::new();
+        let mut table = Table::new("How costs grow", "over | cost | slope | first | last");
         for sweep in &self.sweeps {
             for law in &sweep.slopes {
                 let curve = sweep.curve(law.name);
-                let end = |point: Option<&(f64, f64)>| {
-                    point.map_or_else(String::new, |(x, y)| format!("{} at {}", number(*y), count(*x)))
+                let end = |point: Option<&(f64, [f64; 3])>| {
+                    or_dash(point.map(|(x, y)| format!("{} at {}", number(y[0]), count(*x))))
                 };
-                rows.push(vec![
-                    sweep.name.to_owned(),
-                    law.name.to_owned(),
-                    law.text(),
-                    end(curve.first()),
-                    end(curve.last()),
-                ]);
+                let ends = [end(curve.first()), end(curve.last())];
+                let lead = [sweep.name.to_owned(), law.name.to_owned(), law.text()];
+                table.rows.push([&lead[..], &ends].concat());
             }
         }
-        let heads = ["over", "cost", "slope", "first", "last"].map(str::to_owned).to_vec();
-        Table { title: "How costs grow".into(), heads, rows }
+        table
+    }
+}
+
+impl Report for ScaleReport {
+    const NAME: &'static str = "scale";
+
+    fn page(&self) -> Page {
+        let mut page = Page::new("Memory and scale", &self.machine, &self.spent());
+        page.verdict = self.verdict();
+        page.warnings.extend(interrupted(self.interrupted));
+        page.warnings.extend(self.failures().iter().map(|failure| format!("Failed: {failure}")));
+        page.facts.push(("Command", format!("`{}`", self.command)));
+        page.facts.push(("Repeats", format!("{} in turn", self.repeats)));
+        page.notes = [
+            "Values are medians of the repeats (lowest to highest). Every case runs in a process of its own; scenes \
+             are made in memory first, which no time includes. Peak: the most memory that the process held from then \
+             on, the made meshes and the program itself included.",
+            "Load: from the description to placed and checked meshes and lights. First picture: load, build and the \
+             first sample of every pixel. Processor ns: of all threads together.",
+            "Slopes: exponents of power laws, by least squares of the logarithms of the medians, with their standard \
+             errors. 0 costs nothing more, 1 is in proportion.",
+        ]
+        .map(str::to_owned)
+        .to_vec();
+        page.sections.push(Section { tables: vec![self.laws()], ..Section::default() });
+        // The sweeps of which anything was measured.
+        let measured = self.sweeps.iter().filter(|sweep| sweep.points.iter().any(|point| !point.runs.is_empty()));
+        page.sections.extend(measured.map(SweepReport::section));
+        page
+    }
+
+    /// One line a run.
+    fn sheet(&self) -> Option<Table> {
+        let heads = "sweep | at | repeat | width | height | spp | depth | threads | accelerator | triangles | \
+                     instances | lights | load_seconds | build_seconds | first_pass_seconds | render_seconds | processor_seconds | \
+                     samples | rays | mesh_bytes | accelerator_bytes | film_bytes_per_pixel | start_bytes | \
+                     made_bytes | load_peak_bytes | build_peak_bytes | before_render_bytes | render_peak_bytes";
+        let mut sheet = Table::new("", heads);
+        let points = self.sweeps.iter().flat_map(|sweep| sweep.points.iter().map(move |point| (sweep, point)));
+        for (sweep, point) in points {
+            let Case { size: [width, height], spp, depth, threads, accel, .. } = &point.case;
+            for (repeat, run) in point.runs.iter().enumerate() {
+                let lead = [sweep.name.to_owned(), point.at.to_string(), repeat.to_string()];
+                let how = [*width, *height, *spp, *depth].map(|n| n.to_string());
+                let on = [threads.to_string(), accel.clone()];
+                let counts = [run.triangles, run.instances, run.lights].map(|n| n.to_string());
+                let seconds = [
+                    run.load_seconds,
+                    run.build_seconds,
+                    run.first_pass_seconds,
+                    run.render_seconds,
+                    run.processor_seconds,
+                ];
+                let sizes = [run.samples, run.rays, run.mesh_bytes, run.accelerator_bytes, run.film_bytes_per_pixel];
+                let memory = run.memory.map(|m| [m.start, m.made, m.load, m.build, m.before_render, m.render]);
+                let memory = memory.map_or([const { String::new() }; 6], |bytes| bytes.map(|n| n.to_string()));
+                let (seconds, sizes) = (seconds.map(|s| s.to_string()), sizes.map(|n| n.to_string()));
+                sheet.rows.push([&lead[..], &how, &on, &counts, &seconds, &sizes, &memory].concat());
+            }
+        }
+        Some(sheet)
     }
 }
 
 impl SweepReport {
-    /// Medians over the axis.
-    fn curve(&self, name: &str) -> Vec<(f64, f64)> {
+    /// Medians with their ranges over the axis.
+    fn curve(&self, name: &str) -> Vec<(f64, [f64; 3])> {
         self.points
             .iter()
-            .filter_map(|point| Some((point.at, point.values.iter().find(|value| value.name == name)?.value[0])))
+            .filter_map(|point| Some((point.at, point.values.iter().find(|value| value.name == name)?.value)))
             .collect()
     }
 
-    /// What is fitted, each against its first point, for costs have different units.
-    fn curves(&self) -> Vec<Curve> {
+    /// What is fitted, each against its first point, for costs have different units; and the table.
+    fn section(&self) -> Section {
         let curve = |law: &SlopeReport| {
             let points = self.curve(law.name);
-            let first = points.first().map(|point| point.1).filter(|first| *first > 0.0)?;
-            let points = points.into_iter().map(|(x, y)| (x, y / first)).collect();
+            let first = points.first().map(|point| point.1[0]).filter(|first| *first > 0.0)?;
+            let points = points.into_iter().map(|(x, y)| (x, y.map(|y| y / first))).collect();
             Some(Curve { name: format!("{} (slope {})", law.name, law.text()), points })
         };
-        self.slopes.iter().filter_map(curve).collect()
+        let curves: Vec<Curve> = self.slopes.iter().filter_map(curve).collect();
+        let mut section = Section { title: self.name.to_owned(), tables: vec![self.table()], ..Section::default() };
+        if !curves.is_empty() {
+            let (x, y) = (self.axis.to_owned(), "times the first".to_owned());
+            let drawing = Drawing::Curves(Curves { x, y, curves, marks: Vec::new() });
+            section.figures.push(Figure { caption: self.what.clone(), drawing });
+        }
+        section
     }
 
     /// Rates of several threads over those of one, repeat by repeat.
@@ -360,9 +309,8 @@ impl SweepReport {
             .find_map(|point| (!point.values.is_empty()).then(|| point.values.iter().map(|v| v.name).collect()))
             .unwrap_or_default();
         let row = |point: &PointReport| {
-            let cell = |name: &&str| {
-                point.values.iter().find(|value| value.name == *name).map_or_else(|| "-".into(), ValueReport::text)
-            };
+            let cell =
+                |name: &&str| or_dash(point.values.iter().find(|value| value.name == *name).map(ValueReport::text));
             std::iter::once(point.name()).chain(names.iter().map(cell)).collect()
         };
         let heads = std::iter::once(self.axis).chain(names.iter().copied()).map(str::to_owned).collect();
@@ -398,17 +346,4 @@ impl SlopeReport {
         let error = self.fit.standard_error.map_or(String::new(), |error| format!(" ± {error:.2}"));
         format!("{:.2}{error}", self.fit.slope)
     }
-}
-
-/// A whole number with its thousands set apart.
-fn count(value: f64) -> String {
-    let digits = format!("{value:.0}");
-    let mut out = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            out.push(',');
-        }
-        out.push(digit);
-    }
-    out
 }

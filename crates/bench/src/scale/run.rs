@@ -4,14 +4,13 @@
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use rustix::time::{ClockId, clock_gettime};
 use serde::{Deserialize, Serialize};
 
 use super::plan::Case;
 use super::scenes;
 use crate::accel;
 use crate::compile;
-use crate::machine::{memory_in_use, reset_peak_memory};
+use crate::machine::{memory_in_use, processor_seconds, reset_peak_memory};
 use crate::render::{self, Overrides, Settings, Silent};
 use steradian::{Error, Result};
 
@@ -72,12 +71,6 @@ impl Measured {
     pub fn peak_bytes(&self) -> Option<u64> {
         self.memory.map(|memory| memory.load.max(memory.build).max(memory.render))
     }
-}
-
-/// Processor seconds of this process so far.
-fn processor_seconds() -> f64 {
-    let now = clock_gettime(ClockId::ProcessCPUTime);
-    now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
 }
 
 /// What the process holds now, and the most since the last question.

@@ -11,14 +11,12 @@ mod report;
 pub mod scenes;
 pub mod statistics;
 
-use std::time::Instant;
-
 use serde::Serialize;
 
 pub use outcome::{Bound, Faults, Measure, Outcome, Plot, Status};
 pub use report::StabilityReport;
 
-use super::Watch;
+use super::{Spent, Watch};
 use steradian::{Error, Result};
 
 /// How long a check may take.
@@ -68,6 +66,8 @@ pub struct CheckReport {
     pub outcome: Outcome,
     /// How long it took.
     pub seconds: f64,
+    /// Processor seconds, of all threads together.
+    pub processor_seconds: f64,
 }
 
 /// Lists checks, and makes a test of each that runs it quickly.
@@ -155,13 +155,13 @@ pub fn choose(names: &[String]) -> Result<Vec<&'static Check>> {
 impl Check {
     /// Measures.
     pub fn run(&self, effort: Effort) -> CheckReport {
-        let start = Instant::now();
-        let outcome = (self.run)(effort);
-        self.report(outcome, start.elapsed().as_secs_f64())
+        let (outcome, spent) = Spent::on(1, || (self.run)(effort));
+        self.report(outcome, spent.seconds, spent.processor_seconds)
     }
 
-    fn report(&self, outcome: Outcome, seconds: f64) -> CheckReport {
-        CheckReport { id: self.id, name: self.name, setup: self.setup, status: outcome.status(), outcome, seconds }
+    fn report(&self, outcome: Outcome, seconds: f64, processor_seconds: f64) -> CheckReport {
+        let (status, Self { id, name, setup, .. }) = (outcome.status(), *self);
+        CheckReport { id, name, setup, status, outcome, seconds, processor_seconds }
     }
 }
 
@@ -245,7 +245,8 @@ pub(crate) mod testing {
     fn failures_leave_pictures_and_say_what_broke() {
         let lost = Faults::of(&[1, 8, 9], |&ray| usize::from(ray > 7), |ray| format!("ray {ray}"));
         let outcome = Outcome::new().at_most("error", 2.0, 1.0).none("lost", lost).pictures("grid", 1, &[1.0], &[3.0]);
-        let report = CheckReport { id: "Z1", name: "n", setup: "s", status: outcome.status(), outcome, seconds: 0.0 };
+        let check = Check { id: "Z1", name: "n", setup: "s", run: |_| Outcome::new() };
+        let report = check.report(outcome, 0.0, 0.0);
         assert_eq!(report::broken(&report), "error is 2, must be ≤ 1; lost is 2, must be ≤ 0 (the first: ray 8)");
         let folder = tempfile::tempdir().unwrap();
         assert_eq!(

@@ -1,19 +1,15 @@
-//! The catalogue's results as a table, a page with plots, and JSON.
+//! The report of `bench stability`.
 
-use std::fmt::Write;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::{Bound, CheckReport, Effort, Measure, Outcome, Plot, Status, catalogue, group};
-use crate::Machine;
 use crate::desc::{OutputDesc, PixelTypeDesc};
 use crate::output::{RenderInfo, write_exr};
-use crate::report::html;
-use crate::report::markdown::{self, Table};
-use crate::report::plot::{self, Curve};
-use crate::report::write_files;
+use crate::report::{Curve, Curves, Drawing, Figure, Page, Report, Section, Table, interrupted, write_file};
+use crate::{Machine, Spent};
 use steradian::{Error, Result};
 
 /// Name of the file that a run can be taken up from.
@@ -40,60 +36,12 @@ impl StabilityReport {
         self.checks.iter().filter(|check| check.status == Status::Failed)
     }
 
-    /// As JSON.
-    ///
-    /// # Errors
-    /// None in practice.
-    pub fn json(&self) -> Result<String> {
-        serde_json::to_string_pretty(self).map_err(|e| Error::Internal(e.to_string()))
-    }
-
-    /// A table of each group.
-    pub fn markdown(&self) -> String {
-        let mut out = format!("# Numerical stability\n\n{}\n", self.header());
-        for table in self.tables() {
-            markdown::add(&mut out, &table);
-        }
-        out.push('\n');
-        for (id, line) in self.remarks() {
-            let _ = writeln!(out, "- **{id}** {line}");
-        }
-        out
-    }
-
-    /// One page with plots.
-    ///
-    /// # Errors
-    /// If a plot cannot be drawn.
-    pub fn html(&self) -> Result<String> {
-        let mut out = html::begin("Numerical stability", &self.header());
-        for check in &self.checks {
-            for plot in &check.outcome.plots {
-                html::figure(&mut out, &draw(plot)?, &format!("{} {}: {}", check.id, check.name, plot.caption));
-            }
-        }
-        for table in self.tables() {
-            html::add_table(&mut out, &table);
-        }
-        out.push_str("<ul>\n");
-        for (id, line) in self.remarks() {
-            let _ = writeln!(out, "<li><b>{id}</b> {}</li>", html::escape(&line));
-        }
-        out.push_str("</ul>\n");
-        out.push_str(html::END);
-        Ok(out)
-    }
-
-    /// Writes `stability.json`, `stability.md` and `stability.html` into a folder, which is made if it does not exist,
-    /// and below it `evidence/` with the pictures of checks that failed.
+    /// Writes everything into a folder, and below it `evidence/` with the pictures of checks that failed.
     ///
     /// # Errors
     /// [`Error::Output`] naming the file.
-    pub fn write_to(&self, folder: &Path) -> Result<()> {
-        write_files(
-            folder,
-            &[(JSON, self.json()?), ("stability.md", self.markdown()), ("stability.html", self.html()?)],
-        )?;
+    pub fn write_with_evidence_to(&self, folder: &Path) -> Result<()> {
+        self.write_to(folder)?;
         for failure in self.failures() {
             write_evidence(&folder.join("evidence"), failure)?;
         }
@@ -105,7 +53,7 @@ impl StabilityReport {
     /// # Errors
     /// [`Error::Output`] naming the file.
     pub fn write_json_to(&self, folder: &Path) -> Result<()> {
-        write_files(folder, &[(JSON, self.json()?)])
+        write_file(folder, JSON, &self.json()?)
     }
 
     /// A line for each check: id, how it ended, name.
@@ -129,67 +77,90 @@ impl StabilityReport {
             let known = catalogue().find(|known| check["id"] == known.id)?;
             let outcome =
                 Outcome::deserialize(&check["outcome"]).ok().filter(|outcome| outcome.status() != Status::Failed)?;
-            Some(known.report(outcome, check["seconds"].as_f64()?))
+            let processor_seconds = check["processor_seconds"].as_f64()?;
+            Some(known.report(outcome, check["seconds"].as_f64()?, processor_seconds))
         };
         checks.iter().filter_map(kept).collect()
     }
 
-    fn header(&self) -> String {
+    fn verdict(&self) -> String {
         let count = |status| self.checks.iter().filter(|check| check.status == status).count();
-        let m = &self.machine;
-        let seconds: f64 = self.checks.iter().map(|check| check.seconds).sum();
-        let cut = if self.interrupted { " Interrupted: what is missing was not run." } else { "" };
-        format!(
-            "{} checks: {} passed, {} fell short of what one would wish (causes below), {} failed, in {seconds:.0} s. \
-             {} ({}, {} threads), steradian {}; `{}`. False-alarm rate of each statistical check: 1e-6.{cut}",
-            self.checks.len(),
-            count(Status::Passed),
-            count(Status::Short),
-            count(Status::Failed),
-            m.processor,
-            m.instruction_set,
-            m.threads,
-            m.version,
-            self.command
-        )
+        let short = match count(Status::Short) {
+            0 => String::new(),
+            n => format!("{n} passed by a weaker bound than desired (reasons below), "),
+        };
+        let (all, passed, failed) = (self.checks.len(), count(Status::Passed), count(Status::Failed));
+        format!("{all} checks: {passed} passed, {short}{failed} failed.")
     }
 
-    fn tables(&self) -> Vec<Table> {
-        let mut tables: Vec<Table> = Vec::new();
+    /// A section for each group of checks.
+    fn groups(&self) -> Vec<Section> {
+        let mut sections: Vec<Section> = Vec::new();
         for check in &self.checks {
             let title = format!("{}. {}", &check.id[..1], group(check.id));
-            if tables.last().is_none_or(|table| table.title != title) {
-                let heads = ["", "check", "set-up", "criterion", "measured", "", "s"].map(str::to_owned).to_vec();
-                tables.push(Table { title, heads, rows: Vec::new() });
+            if sections.last().is_none_or(|section| section.title != title) {
+                let heads = "check | verdict | what | measured | criterion | set-up | s | processor s";
+                sections.push(Section { title, tables: vec![Table::new("", heads)], ..Section::default() });
             }
-            let measures = &check.outcome.measures;
-            let row = [
-                check.id.to_owned(),
-                check.name.to_owned(),
-                check.setup.to_owned(),
-                measures.iter().filter(|m| m.bound != Bound::Any).map(criterion).collect::<Vec<_>>().join("; "),
-                measures.iter().map(|m| format!("{}: {}", m.what, number(m.value))).collect::<Vec<_>>().join("; "),
-                word(check.status).to_owned(),
-                format!("{:.1}", check.seconds),
-            ];
-            if let Some(table) = tables.last_mut() {
-                table.rows.push(row.to_vec());
-            }
+            let Some(Section { tables, figures, .. }) = sections.last_mut() else { continue };
+            tables[0].rows.push(row(check));
+            figures.extend(check.outcome.plots.iter().map(|plot| Figure {
+                caption: format!("{} {}: {}", check.id, check.name, plot.caption),
+                drawing: Drawing::Curves(curves(plot)),
+            }));
         }
-        tables
+        sections
     }
 
     /// Failures and shortfalls, in order.
-    fn remarks(&self) -> Vec<(&str, String)> {
+    fn remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
         for check in &self.checks {
             if check.status == Status::Failed {
-                remarks.push((check.id, format!("failed: {}", broken(check))));
+                remarks.push(format!("{} failed: {}", check.id, broken(check)));
             }
-            remarks.extend(check.outcome.shortfalls.iter().map(|cause| (check.id, format!("falls short: {cause}"))));
+            let shortfalls = check.outcome.shortfalls.iter();
+            remarks.extend(shortfalls.map(|cause| format!("{} falls short: {cause}", check.id)));
         }
         remarks
     }
+}
+
+impl Report for StabilityReport {
+    const NAME: &'static str = "stability";
+
+    fn page(&self) -> Page {
+        let mut spent = Spent::default();
+        // How many threads a check uses is not known: at least one.
+        self.checks.iter().for_each(|check| spent.add(Spent::new(1, check.seconds, check.processor_seconds)));
+        let mut page = Page::new("Numerical stability", &self.machine, &spent);
+        page.verdict = self.verdict();
+        page.warnings.extend(interrupted(self.interrupted));
+        page.facts.push(("Command", format!("`{}`", self.command)));
+        page.facts.push(("False-alarm rate", "1e-6 for each statistical check".to_owned()));
+        let remarks = self.remarks();
+        if !remarks.is_empty() {
+            let title = "What failed or falls short".to_owned();
+            page.sections.push(Section { title, remarks, ..Section::default() });
+        }
+        page.sections.extend(self.groups());
+        page
+    }
+}
+
+fn row(check: &CheckReport) -> Vec<String> {
+    let measures = &check.outcome.measures;
+    let join = |parts: Vec<String>| parts.join("; ");
+    vec![
+        check.id.to_owned(),
+        word(check.status).to_owned(),
+        check.name.to_owned(),
+        join(measures.iter().map(|m| format!("{}: {}", m.what, number(m.value))).collect()),
+        join(measures.iter().filter(|m| m.bound != Bound::Any).map(criterion).collect()),
+        check.setup.to_owned(),
+        format!("{:.1}", check.seconds),
+        format!("{:.1}", check.processor_seconds),
+    ]
 }
 
 /// The status in a word.
@@ -197,7 +168,7 @@ fn word(status: Status) -> &'static str {
     match status {
         Status::Passed => "passed",
         Status::Short => "short",
-        Status::Failed => "FAILED",
+        Status::Failed => "failed",
     }
 }
 
@@ -244,16 +215,13 @@ pub fn write_evidence(folder: &Path, report: &CheckReport) -> Result<Vec<String>
     Ok(names)
 }
 
-fn draw(plot: &Plot) -> Result<String> {
-    let curves: Vec<Curve> = plot
-        .curves
-        .iter()
-        .map(|(name, points)| Curve {
-            name: name.clone(),
-            points: points.iter().map(|&(x, y)| (x, y.max(plot.floor))).collect(),
-        })
-        .collect();
-    plot::curves(&curves, &plot.x, &plot.y, &[])
+/// What is drawn of a plot: zeros at its floor.
+fn curves(plot: &Plot) -> Curves {
+    let curve = |(name, points): &(String, Vec<(f64, f64)>)| {
+        Curve::new(name.as_str(), points.iter().map(|&(x, y)| (x, y.max(plot.floor))))
+    };
+    let curves = plot.curves.iter().map(curve).collect();
+    Curves { x: plot.x.clone(), y: plot.y.clone(), curves, marks: Vec::new() }
 }
 
 /// A number with four digits, as an integer if it is one.

@@ -16,6 +16,7 @@ mod live;
 mod log;
 mod state;
 mod texts;
+mod view;
 
 use std::path::PathBuf;
 
@@ -45,6 +46,7 @@ use state::MERGE_EXAMPLES;
 pub use state::{MergeArgs, StateArgs};
 pub use texts::FIRST_STEPS;
 use texts::{EXAMPLES, RENDER_EXAMPLES, RENDER_SHORT_EXAMPLES};
+pub use view::ViewArgs;
 
 /// Options of `render` that `-h` shows; `--help` shows all.
 const COMMON_OPTIONS: [&str; 21] = [
@@ -145,6 +147,13 @@ pub enum Command {
     /// psnr relates mse to the reference's peak, mean ratio is the test's mean over the reference's.
     #[command(after_help = "Example:\n  steradian compare reference.exr test.exr --json | jq .relmse")]
     Compare(CompareArgs),
+    /// Show one or two EXR files in the browser
+    ///
+    /// Serves a page to this machine alone, prints its address, and opens it with xdg-open. The page shows every layer,
+    /// with exposure, views, zoom and the exact values of pixels; of two pictures it shows one, the other, both under a
+    /// slider, or a map of how much they seem to differ (HDR-FLIP). Ctrl-C ends it.
+    #[command(after_help = view::EXAMPLES)]
+    View(ViewArgs),
     /// Write jobs for render farms
     #[command(subcommand)]
     Farm(FarmCommand),

@@ -13,8 +13,8 @@ use rayon::prelude::*;
 
 use self::color::{Plane, Planes};
 use self::filter::{DETECTORS, Kernel};
+use crate::error::{Error, Result};
 use crate::film::{Image, LayerKind};
-use steradian::{Error, Result};
 
 /// Pixels per degree of the visual angle.
 const PIXELS_PER_DEGREE: f64 = 0.7 * 3840.0 / 0.7 * std::f64::consts::PI / 180.0;
