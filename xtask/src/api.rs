@@ -46,7 +46,12 @@ fn pages() -> Result<PathBuf> {
 fn interface(folder: &Path) -> Result<String> {
     let index = fs::read_to_string(folder.join("all.html"))?;
     let mut items = BTreeMap::new();
-    for link in index.split("<li><a href=\"").skip(1).filter_map(|rest| rest.split('"').next()) {
+    for link in index
+        .split("<li><a href=\"")
+        .skip(1)
+        .filter_map(|rest| rest.split('"').next())
+        .filter(|link| link.ends_with(".html"))
+    {
         let page = fs::read_to_string(folder.join(link))?;
         let Some((module, name)) = Path::new(link).parent().zip(Path::new(link).file_stem()) else { continue };
         // `struct.Renderer` in the folder of its module.
