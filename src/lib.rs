@@ -60,7 +60,6 @@ mod render;
 mod renderer;
 mod sampling;
 mod scene;
-mod subsurface;
 mod suggestion;
 mod texture;
 
