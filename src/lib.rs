@@ -61,7 +61,6 @@ mod renderer;
 mod sampling;
 mod scene;
 mod subdivision;
-mod subsurface;
 mod suggestion;
 mod texture;
 

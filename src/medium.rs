@@ -7,10 +7,12 @@
 
 mod blocks;
 mod noise;
+mod subsurface;
 mod volume;
 mod voxels;
 
 pub use noise::Noise;
+pub use subsurface::{Subsurface, half_space_albedo};
 pub use volume::{Coefficients, ExtinctionSplit, FreeFlight, Tracked, Volume, VolumeGrids};
 pub use voxels::{Border, VoxelGrid};
 

@@ -13,9 +13,8 @@ use crate::light::{LightGroups, LightSet};
 use crate::material::Material;
 use crate::math::Vec3;
 use crate::math::random::hash64;
-use crate::medium::Media;
+use crate::medium::{Media, Subsurface};
 use crate::normal_perturbation::NormalPerturbation;
-use crate::subsurface::Subsurface;
 use crate::texture::{Footprint, Texture};
 
 /// How a shape looks.

@@ -52,16 +52,7 @@ impl MaterialTable {
                 outer.push(name);
                 let place = format!("{path}.base");
                 let base_id = self.part(compiler, desc, &place, base, outer)?;
-                if self.transmits(base_id) {
-                    return Err(compiler
-                        .files
-                        .error(&place, format!("\"{base}\" lets light through: what is below a coat must be opaque")));
-                }
-                if self.any_part(base_id, &|id| self.has_subsurface(id)) {
-                    let message = format!("\"{base}\" has a random walk below its surface: use `clearcoat`");
-                    return Err(compiler.files.error(&place, message));
-                }
-                self.check_no_relief(compiler, &place, base, base_id)?;
+                self.check_base(compiler, &place, base, base_id)?;
                 let coating = Coating {
                     coat: CoatInput::new(
                         compiler.ior(&path, ior, 1.0)?,
@@ -140,6 +131,18 @@ impl MaterialTable {
     /// Whether light may cross the material or a part of it.
     pub(super) fn transmits(&self, id: MaterialId) -> bool {
         self.any_part(id, &|id| self.materials[id.index()].flags().transmits())
+    }
+
+    /// That a material can be below a coat.
+    fn check_base(&self, compiler: &Compiler, place: &str, name: &str, id: MaterialId) -> Result<()> {
+        let fault = |why: &str| Err(compiler.files.error(place, format!("\"{name}\" {why}")));
+        if self.transmits(id) {
+            return fault("lets light through: what is below a coat must be opaque");
+        }
+        if self.any_part(id, &|id| self.has_subsurface(id)) {
+            return fault("has a random walk below its surface: use its `clearcoat`");
+        }
+        self.check_no_relief(compiler, place, name, id)
     }
 
     /// That neither a material nor a part of it has a relief.

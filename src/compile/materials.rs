@@ -18,10 +18,9 @@ use crate::material::{
     AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, RangedInput, ScalarInput, TexturedMaterial,
 };
 use crate::math::RenderSpace;
-use crate::medium::{Media, Medium};
+use crate::medium::{Media, Medium, Subsurface};
 use crate::metal::{Metal, MetalNames};
 use crate::normal_perturbation::NormalPerturbation;
-use crate::subsurface::Subsurface;
 use crate::suggestion::did_you_mean;
 use crate::texture::Texture;
 

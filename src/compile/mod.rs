@@ -54,7 +54,7 @@ use crate::id::TextureId;
 use crate::light::LightSet;
 use crate::material::Material;
 use crate::math::{Bounds, RenderSpace};
-use crate::medium::Medium;
+use crate::medium::{Medium, Subsurface};
 use crate::scene::{Scene, SceneFeatures, Surface};
 use crate::suggestion::did_you_mean;
 use crate::texture::Texture;
@@ -260,16 +260,10 @@ impl Builder {
         let lights = LightSet::new(self.lights.lights, &self.geometry);
         let sky = !lights.at_infinity().is_empty();
         let fog = self.materials.media.surroundings().is_some_and(Medium::is_participating);
-        if self.geometry.world.is_empty() && self.geometry.instances.is_empty() && !sky && !fog {
-            files.refuse_own("shapes", "there is nothing to see: no shapes, no instances and no environment")?;
-        }
+        check_visible(files, &self.geometry, sky || fog)?;
         check_light(files, &desc.integrator, lights.shines(), &in_use)?;
         let part_normal_perturbations = self.materials.part_normal_perturbations();
         let subsurface = self.materials.subsurface(&self.space);
-        if has_photons(&desc.integrator) && !subsurface.is_empty() {
-            let message = "photons are not traced below surfaces: `subsurface_method` \"random_walk\"";
-            return Err(files.error("integrator.caustics", message));
-        }
         let materials = self.materials.materials;
         let normal_perturbations = !part_normal_perturbations.is_empty()
             || self.surfaces.iter().any(|surface| surface.normal_perturbation.is_some());
@@ -292,7 +286,7 @@ impl Builder {
             delta_materials: materials.iter().any(|material| material.flags().is_delta()),
             media: !in_use.is_empty(),
             participating_media: in_use.iter().any(Medium::is_participating),
-            subsurface: !subsurface.is_empty(),
+            subsurface: check_walks(files, &desc.integrator, &subsurface)?,
             anisotropic,
             lens: camera.lens().is_some(),
             motion: self.geometry.is_moving() || camera.is_moving(),
@@ -313,6 +307,23 @@ impl Builder {
             identities: self.identities.finish(),
         })
     }
+}
+
+/// Refuses a scene in which nothing can be seen.
+fn check_visible(files: &CompileContext, geometry: &Geometry, has_surroundings: bool) -> Result<()> {
+    if geometry.world.is_empty() && geometry.instances.is_empty() && !has_surroundings {
+        files.refuse_own("shapes", "there is nothing to see: no shapes, no instances and no environment")?;
+    }
+    Ok(())
+}
+
+/// Whether light is scattered below some surface; refuses photons, which are not traced there.
+fn check_walks(files: &CompileContext, integrator: &IntegratorDesc, subsurface: &[Option<Subsurface>]) -> Result<bool> {
+    if has_photons(integrator) && !subsurface.is_empty() {
+        let message = "photons are not traced below surfaces: `subsurface_method` \"random_walk\"";
+        return Err(files.error("integrator.caustics", message));
+    }
+    Ok(!subsurface.is_empty())
 }
 
 /// Refuses a scene without light, and photons where they would have to be traced through media that scatter.

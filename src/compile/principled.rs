@@ -6,7 +6,7 @@ use crate::color::Rgb;
 use crate::desc::{CoefficientDesc, PrincipledDesc, PrincipledModelDesc, ScalarDesc, principled_parameters};
 use crate::error::Result;
 use crate::material::{PrincipledInputs, RangedInput, ScalarInput};
-use crate::subsurface::Subsurface;
+use crate::medium::Subsurface;
 
 /// The radii of red, green and blue where none are given: Blender's.
 const DEFAULT_RADIUS: [f32; 3] = [1.0, 0.2, 0.1];

@@ -16,12 +16,11 @@ use crate::id::ShapeId;
 use crate::material::Material;
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{Aabb, Ray, Rng, Vec3};
-use crate::medium::Medium;
+use crate::medium::{Medium, Subsurface};
 use crate::scene::Scene;
-use crate::subsurface::Subsurface;
 
 /// Scatterings and surfaces of one walk, at most: of white light that enters a half-space, 1 in 200 goes farther.
-const MAX_STEPS: u32 = 1 << 14;
+const MAX_STEPS: u64 = 1 << 14;
 
 /// Roulette may end a walk that has less than this left of what has entered.
 const ROULETTE_BELOW: f32 = 0.5;
@@ -116,54 +115,53 @@ fn rounding(at: &SurfaceInteraction) -> f64 {
 }
 
 impl World<'_> {
-    /// Follows a walk to where it leaves the surface, if it does, and counts the rays that it takes beside the first.
-    pub(super) fn walk(&self, walk: &Walk, start: WalkStart, traced: &mut u64) -> Option<WalkEnd> {
+    /// Follows a walk to where it leaves the surface, if it does; with the number of rays that it takes beside the
+    /// first.
+    pub(super) fn walk(&self, walk: &Walk, start: WalkStart) -> (Option<WalkEnd>, u64) {
         let WalkStart { mut ray, mut hit, carried, u: [u, v, mut x, mut y], mut random } = start;
         let medium = &walk.medium;
-        let all = carried.max_channel();
         let mut weight = Rgb::WHITE;
         let mut sample = DistanceSample::new(carried, [u, v], random.clone());
         let mut track = Track::new(&sample);
         let mut surfaces = 1;
-        for _ in 0..MAX_STEPS {
+        for traced in 0..MAX_STEPS {
             let at = self.resolve(&ray, hit);
             let distance = at.as_ref().map_or(f32::INFINITY, |at| at.t);
             if let Some(free) = travel(medium, distance, &mut sample, &mut track) {
                 weight *= track.weight();
-                let left = (carried * weight).max_channel() / all;
+                let left = (carried * weight).max_channel() / carried.max_channel();
                 if left < ROULETTE_BELOW {
                     if random.unit_f32() >= left {
-                        return None;
+                        return (None, traced);
                     }
                     weight = weight / left;
                 }
-                let direction = medium.phase.sample(-ray.direction, 0.0, [x, y])?.wi;
                 let p = match at.filter(|at| at.t - free < walk.near) {
                     Some(at) => at.spawn(-ray.direction).origin,
                     None => (ray.origin.as_dvec3() + ray.direction.as_dvec3() * f64::from(free)).as_vec3(),
                 };
-                if !self.subsurface.bounds.contains(p) {
-                    return None;
-                }
+                let direction = medium.phase.sample(-ray.direction, 0.0, [x, y]).map(|sample| sample.wi);
+                let Some(direction) = direction.filter(|_| self.subsurface.bounds.contains(p)) else {
+                    return (None, traced);
+                };
                 ray = Ray { time: ray.time, ..Ray::new(p, direction) };
                 sample = DistanceSample::new(carried * weight, random.pair(), random.clone());
                 track = Track::new(&sample);
                 [x, y] = random.pair();
             } else {
-                let (at, met) = (at?, hit?);
+                let (Some(at), Some(met)) = (at, hit) else { return (None, traced) };
                 if self.subsurface.contains(at.shape) {
                     let leaves = ray.direction.dot(at.n_g) * walk.side > 0.0;
                     surfaces += if leaves { -1 } else { 1 };
                     if surfaces == 0 {
-                        return Some(walk.end(&at, met, weight * track.weight()));
+                        return (Some(walk.end(&at, met, weight * track.weight())), traced);
                     }
                 }
                 ray = at.spawn(ray.direction);
             }
             ray.t_max = sample.reach(medium) + walk.near;
             hit = self.accel.intersect(&ray);
-            *traced += 1;
         }
-        None
+        (None, MAX_STEPS)
     }
 }

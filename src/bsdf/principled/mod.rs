@@ -16,8 +16,8 @@
 //! - GGX masks with the height-correlated G2, and light scattered among microfacets several times is added back;
 //! - alpha is `roughness²` stretched by the aspect, within `[0.001, 1]`, for distribution and masking alike;
 //! - tints are the base colour over its largest channel in place of its luminance, so that no channel exceeds 1;
-//! - subsurface scattering is the flat lobe of 2012 for solids as well, or light that enters: a [random walk](walk) goes
-//!   on from there; glass has exact Fresnel terms, all else Schlick's;
+//! - subsurface scattering is the flat lobe of 2012 for solids as well, or light that enters, for a random walk; glass
+//!   has exact Fresnel terms, all else Schlick's;
 //! - the specular lobe that passes a thin sheet has the width of the one that it reflects.
 //!
 //! [`PrincipledModel::Mitsuba`] has the lobes of Mitsuba 3's `principled` and, for thin sheets of glass,

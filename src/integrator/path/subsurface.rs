@@ -38,7 +38,8 @@ pub(super) fn walk(context: &Context, wave: &mut Wave) -> u64 {
             u: context.config.sampler.sample_4d(PixelSeed(seed), sample, dimensions::medium(context.bounce)),
             random: random(context, seed, sample, Purpose::Walk),
         };
-        let end = context.world.walk(walk, start, &mut traced);
+        let (end, rays_of_walk) = context.world.walk(walk, start);
+        traced += rays_of_walk;
         hits[block].set(i, end.as_ref().map(|end| end.hit));
         paths.throughput.set(i, end.as_ref().map_or(Rgb::BLACK, |end| carried * end.weight));
         if let Some(end) = end {

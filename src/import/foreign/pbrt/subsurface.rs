@@ -9,7 +9,7 @@ use crate::desc::{
     SubsurfaceMethodDesc,
 };
 use crate::error::Result;
-use crate::subsurface::half_space_albedo;
+use crate::medium::half_space_albedo;
 
 /// Coefficients of a medium in 1/mm for red, green and blue.
 pub struct Measured {

@@ -1,14 +1,14 @@
 //! Scattering below the surface of a material: the medium whose half-space has a given colour.
 //!
-//! Light that enters a half-space diffusely leaves it with the albedo `A(s) = (1 - s)(1 - 0.139 s) / (1 + 1.17 s)` where
-//! `s² = (1 - a) / (1 - a g)`, `a` is the albedo of a single scattering and `g` its mean cosine (van de Hulst, "Multiple
-//! Light Scattering"). This is inverted here, as by Kulla and Conty ("Revisiting Physically Based Shading at
+//! Light that enters a half-space diffusely leaves it with the albedo `A(s) = (1 - s)(1 - 0.139 s) / (1 + 1.17 s)`,
+//! where `s² = (1 - a) / (1 - a g)`, `a` is the albedo of a single scattering and `g` its mean cosine (van de Hulst,
+//! "Multiple Light Scattering"). This is inverted here, as by Kulla and Conty ("Revisiting Physically Based Shading at
 //! Imageworks"); the fit of Chiang, Kutz and Burley ("Practical and Controllable Subsurface Scattering for Production
 //! Path Tracing") is close to it, but loses 7 % where the colour is white, and has no `g`.
 
+use super::Medium;
 use crate::bsdf::{Phase, PhaseLobe};
 use crate::color::Rgb;
-use crate::medium::Medium;
 
 /// How light is scattered below the surface of a material.
 #[derive(Clone, Copy, Debug, PartialEq)]
