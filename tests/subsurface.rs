@@ -198,7 +198,9 @@ fn open_surfaces_lose_light() {
     }]);
     for radius in [0.01, 0.5, 100.0] {
         let white = wax(&json!(1), json!({ "subsurface_radius": radius }));
-        let image = render(&furnace(&white, sheet.clone()));
+        let mut scene = furnace(&white, sheet.clone());
+        scene["sampler"]["spp"] = json!(8);
+        let image = render(&scene);
         let mean = Estimate::of(&image, 0).mean;
         assert!(pixels(&image).flatten().all(f32::is_finite) && (0.0..1.0).contains(&mean), "{radius}: {mean}");
     }
@@ -208,7 +210,7 @@ fn open_surfaces_lose_light() {
 fn still_life(spp: u32) -> Value {
     json!({
         "film": { "width": 48, "height": 48 },
-        "camera": { "position": [0, 1.2, 5], "look_at": [0, 0.6, 0], "vertical_fov_degrees": 40 },
+        "camera": { "position": [0, 4, 5], "look_at": [0, 0.3, 0], "vertical_fov_degrees": 40 },
         "sampler": { "spp": spp },
         "integrator": { "type": "path", "max_depth": 12 },
         "media": { "haze": { "scattering": 0.02 } },
@@ -222,7 +224,7 @@ fn still_life(spp: u32) -> Value {
             "painted": { "type": "mix", "materials": ["skin", "grey"], "amount": 0.3 }
         },
         "shapes": [
-            { "type": "quad", "material": "grey", "origin": [-4, 0, 4], "edge_u": [8, 0, 0], "edge_v": [0, 0, -8] },
+            { "type": "quad", "material": "grey", "origin": [-20, 0, 20], "edge_u": [40, 0, 0], "edge_v": [0, 0, -40] },
             { "type": "sphere", "material": "skin", "radius": 0.5, "transform": [{ "translate": [-0.6, 0.5, 0] }] },
             {
                 "type": "cube", "material": "painted", "emission": { "radiance": 0.1 },
