@@ -7,7 +7,7 @@ use super::Builder;
 use super::faults::Faults;
 use super::nesting::Nesting;
 use super::prepared::PreparedShape;
-use crate::desc::{InstanceDesc, MeshDesc, SceneDesc, ShapeDesc, SubdivisionDesc, UsedNames};
+use crate::desc::{InstanceDesc, SceneDesc, ShapeDesc, UsedNames};
 use crate::error::Result;
 use crate::film::PlacementId;
 use crate::geometry::{Instance, Object};
@@ -296,5 +296,6 @@ struct Level<'a> {
 
 /// Whether it depends on the camera how a shape is refined.
 fn is_diced(shape: &ShapeDesc) -> bool {
-    matches!(shape, ShapeDesc::Mesh(MeshDesc { subdivision: Some(SubdivisionDesc { edge_length: Some(_), .. }), .. }))
+    let ShapeDesc::Mesh(mesh) = shape else { return false };
+    mesh.subdivision.as_ref().is_some_and(|subdivision| subdivision.edge_length.is_some())
 }

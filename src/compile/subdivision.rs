@@ -152,7 +152,7 @@ fn control(
             .uvs
             .as_ref()
             .map(|uvs| uvs.iter().map(|&[u, v]| DVec3::new(f64::from(u), f64::from(v), 0.0)).collect()),
-        linear: of_vertices(data).map(|values| wide(values)).collect(),
+        linear: of_vertices(data).map(wide).collect(),
         ..Cage::default()
     };
     let is_fans = scheme == Scheme::CatmullClark && !data.faces.is_empty();

@@ -197,10 +197,10 @@ shapes! {
         /// Makes a subdivision surface of the mesh. Vertices that count as the same, by `smooth_by`, are one. Normals
         /// are those of the limit surface unless `shading` is `computed` or `flat`. Default: none.
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        subdivision: Option<SubdivisionDesc>,
+        subdivision: Option<Box<SubdivisionDesc>>,
         /// Moves the vertices, after subdivision; then normals are computed unless `shading` is `flat`. Default: none.
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        displacement: Option<DisplacementDesc>,
+        displacement: Option<Box<DisplacementDesc>>,
     }
     /// A sphere about the origin, or the part of it between two heights and within an angle about +z. u is the angle
     /// over `phi_max`; v runs from the bottom to the top of what is kept, by the angle from -z.
