@@ -259,8 +259,8 @@ impl Builder {
         let light_groups = self.lights.groups();
         let lights = LightSet::new(self.lights.lights, &self.geometry);
         let sky = !lights.at_infinity().is_empty();
-        let fog = self.materials.media.surroundings().is_some_and(Medium::is_participating);
-        check_visible(files, &self.geometry, sky || fog)?;
+        let has_fog = self.materials.media.surroundings().is_some_and(Medium::is_participating);
+        check_visible(files, &self.geometry, sky || has_fog)?;
         check_light(files, &desc.integrator, lights.shines(), &in_use)?;
         let part_normal_perturbations = self.materials.part_normal_perturbations();
         let subsurface = self.materials.subsurface(&self.space);
@@ -268,7 +268,6 @@ impl Builder {
         let normal_perturbations = !part_normal_perturbations.is_empty()
             || self.surfaces.iter().any(|surface| surface.normal_perturbation.is_some());
         let anisotropic = materials.iter().any(|material| material.flags().is_anisotropic());
-        let smooth = |shape: &Shape| matches!(shape, Shape::Mesh(mesh) if mesh.has_normals());
         let features = SceneFeatures {
             lights: !lights.is_empty(),
             hidden_emitters: self.surfaces.iter().any(|surface| surface.hidden),
@@ -281,7 +280,7 @@ impl Builder {
                 && self.materials.textures.textures.iter().any(Texture::is_filtered),
             image_textures: self.materials.textures.textures.iter().any(Texture::has_image),
             normal_perturbations,
-            shading_normals: normal_perturbations || self.geometry.shapes.iter().any(smooth),
+            shading_normals: normal_perturbations || self.geometry.shapes.iter().any(is_smooth),
             parameters: anisotropic || !self.materials.textures.textures.is_empty(),
             delta_materials: materials.iter().any(|material| material.flags().is_delta()),
             media: !in_use.is_empty(),
@@ -307,6 +306,10 @@ impl Builder {
             identities: self.identities.finish(),
         })
     }
+}
+
+fn is_smooth(shape: &Shape) -> bool {
+    matches!(shape, Shape::Mesh(mesh) if mesh.has_normals())
 }
 
 /// Refuses a scene in which nothing can be seen.
