@@ -61,27 +61,35 @@ impl Block {
         Self(weights.map(|row| row.map(|w| (f64::from(w) * scale) as f32)))
     }
 
-    #[inline]
+    // A loop: `map` may be compiled to calls.
+    #[inline(always)]
     fn rows(&self) -> [f32; SIDE] {
-        self.0.map(|[a, b, c, d]| (a + b) + (c + d))
+        let mut sums = [0.0; SIDE];
+        for (sum, [a, b, c, d]) in sums.iter_mut().zip(&self.0) {
+            *sum = (a + b) + (c + d);
+        }
+        sums
     }
 
     /// The probability of a cell of a block that has the probability `pmf`; positive where the weight is.
-    #[inline]
+    #[inline(always)]
     fn pmf(&self, x: usize, y: usize, pmf: f64) -> f32 {
         let weight = self.0[y][x];
         if weight == 0.0 {
             return 0.0;
         }
         let [first, second, third, fourth] = &self.0;
-        let columns: [f32; SIDE] = std::array::from_fn(|i| (first[i] + second[i]) + (third[i] + fourth[i]));
+        let mut columns = [0.0; SIDE];
+        for (i, column) in columns.iter_mut().enumerate() {
+            *column = (first[i] + second[i]) + (third[i] + fourth[i]);
+        }
         let sum = (columns[0] + columns[1]) + (columns[2] + columns[3]);
         ((pmf * f64::from(weight / sum)) as f32).max(f32::MIN_POSITIVE)
     }
 }
 
 /// The entry of a distribution of four weights at `u` in `[0, 1)`, never one of weight 0, and where in it `u` is.
-#[inline]
+#[inline(always)]
 fn invert_four(weights: &[f32; SIDE], u: f32) -> (usize, f32) {
     let [a, b, c, d] = *weights;
     let limits = [0.0, a, a + b, a + b + c];
@@ -127,7 +135,7 @@ struct ChosenBlock {
 
 impl ChosenBlock {
     /// A cell of the block.
-    #[inline]
+    #[inline(always)]
     fn cell_in(&self, block: &Block) -> PiecewiseCell {
         let (y, v) = invert_four(&block.rows(), self.within[1]);
         let (x, u) = invert_four(&block.0[y], self.within[0]);
