@@ -26,7 +26,7 @@ fn reports_hold_every_accelerator_on_the_same_rays() {
         "--threads",
         "1,2",
         "--scaling",
-        "1e3..1e3",
+        "1e3..1e4",
         "--out",
         out,
         "-q",

@@ -112,3 +112,52 @@ fn groups(headers: &[Header], color_part: usize, color: &[Place]) -> Vec<Vec<Pla
     groups.iter_mut().skip(1).for_each(|(_, group)| group.sort_by_key(rank));
     groups.into_iter().map(|(_, group)| group).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    use exr::meta::attribute::IntegerBounds;
+    use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, LayerAttributes, WritableImage};
+
+    /// Channels as other programs name them, in two parts and with a window of their own.
+    #[test]
+    fn all_layers_of_any_file_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let part = |name: &str, size: (usize, usize), names: &[&str]| {
+            let channel = |(i, name): (usize, &&str)| {
+                let values = (0..size.0 * size.1).map(|pixel| (10 * pixel + i) as f32).collect();
+                AnyChannel::new(*name, FlatSamples::F32(values))
+            };
+            let channels = AnyChannels::sort(names.iter().enumerate().map(channel).collect());
+            exr::prelude::Layer::new(size, LayerAttributes::named(name), Encoding::FAST_LOSSLESS, channels)
+        };
+        let color =
+            ["View.Combined.R", "View.Combined.G", "View.Combined.B", "View.Depth.Z", "View.Vector.Y", "View.Vector.X"];
+        let parts = [part("main", (2, 1), &color), part("id", (2, 1), &["U"]), part("small", (1, 1), &["V"])];
+        let image = exr::prelude::Image::from_layers(
+            exr::prelude::ImageAttributes::new(IntegerBounds::from_dimensions((2, 1))),
+            exr::prelude::Layers::from_iter(parts),
+        );
+        image.write().to_file(&path).unwrap();
+        let file = read_exr_layers(&path).unwrap();
+        assert_eq!((file.size, file.crop), ([2, 1], Crop::full([2, 1])));
+        let found: Vec<(String, &[f32])> = file.layers.iter().map(|l| (l.names.join(" "), &l.data[..])).collect();
+        let expected: [(&str, &[f32]); 4] = [
+            ("View.Combined.R View.Combined.G View.Combined.B", &[0.0, 1.0, 2.0, 10.0, 11.0, 12.0]),
+            ("View.Depth.Z", &[3.0, 13.0]),
+            ("View.Vector.X View.Vector.Y", &[5.0, 4.0, 15.0, 14.0]),
+            ("id.U", &[0.0, 10.0]),
+        ];
+        assert_eq!(found, expected.map(|(names, data)| (names.to_owned(), data)));
+        // Gray is one channel.
+        let gray = exr::prelude::Image::from_layer(part("gray", (1, 1), &["A", "Y"]));
+        gray.write().to_file(&path).unwrap();
+        let file = read_exr_layers(&path).unwrap();
+        assert_eq!(
+            (&file.layers[0].names[..], &file.layers[0].data[..]),
+            (&["Y", "A"].map(str::to_owned)[..], &[1.0, 0.0][..])
+        );
+    }
+}

@@ -43,9 +43,9 @@ impl Blocks {
     }
 
     /// The mean of the tests over that of the reference, and the ends of its confidence interval, one of `intervals`
-    /// that hold together with 95 %; `None` for a black reference or a single block. Under the hypothesis of no bias the
-    /// differences of blocks are independent and centred, so that the variance of their sum is the sum of their squares;
-    /// it holds the reference's noise too.
+    /// that hold together with 95 %; `None` for a black reference or a single block. Under the hypothesis of no bias
+    /// the differences of blocks are independent and centred, so that the variance of their sum is the sum of their
+    /// squares; it holds the reference's noise too.
     pub(super) fn ratio(&self, intervals: usize) -> Option<[f64; 3]> {
         let n = self.differences.len() as f64;
         if n < 2.0 || !(self.reference > 0.0) {

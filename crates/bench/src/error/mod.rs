@@ -23,7 +23,6 @@ use self::bias::Blocks;
 use self::plan::{Measured, Program};
 use super::{Machine, Watch};
 use crate::film::Image;
-use crate::output::flip::{hdr_flip, mean};
 use crate::output::{Comparison, compare};
 use crate::scene::Scene;
 use steradian::{Error, Result};
@@ -82,11 +81,8 @@ pub fn bench_error(
                     if all_fit || Some(*budget) == options.largest_budget() {
                         report.pictures.add(v, b, &measured.image);
                     }
-                    let differences = hdr_flip(&reference.image, &measured.image)?;
-                    run.flip = Some(mean(&differences));
-                    if Some(*budget) == options.largest_budget() {
-                        report.pictures.show(&variant.name, &measured.image, &differences)?;
-                    }
+                    let name = (Some(*budget) == options.largest_budget()).then_some(variant.name.as_str());
+                    run.flip = Some(report.pictures.flip(&reference.image, &measured.image, name)?);
                 }
                 if measured.process_seconds.is_none() {
                     report.spent.add(measured.spent);

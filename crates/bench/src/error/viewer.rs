@@ -10,7 +10,7 @@ use serde_json::json;
 use super::ErrorReport;
 use crate::film::{Image, LayerKind};
 use crate::output::RELATIVE_FLOOR;
-use crate::output::flip::mean;
+use crate::output::flip::{hdr_flip, mean};
 use crate::report::{Picture, base64, heat, thumbnail};
 use steradian::Result;
 
@@ -55,12 +55,15 @@ impl Pictures {
         self.tests.push((variant, budget, pack(image)));
     }
 
-    /// Adds a small picture of a variant, and one of its differences as FLIP has them.
-    pub(super) fn show(&mut self, name: &str, image: &Image, flip: &[f32]) -> Result<()> {
-        self.small.push(thumbnail(name.to_owned(), image, SIDE)?);
-        let caption = format!("{name}: FLIP, mean {:.3}", mean(flip));
-        self.small.push(heat(caption, self.size, SIDE, |i| flip.get(i).copied().unwrap_or(0.0))?);
-        Ok(())
+    /// The mean FLIP of a picture. With a name it is shown small, and so are the differences.
+    pub(super) fn flip(&mut self, reference: &Image, image: &Image, name: Option<&str>) -> Result<f64> {
+        let flip = hdr_flip(reference, image)?;
+        let mean = mean(&flip);
+        if let Some(name) = name {
+            self.small.push(thumbnail(name.to_owned(), image, SIDE)?);
+            self.small.push(heat(format!("{name}: FLIP, mean {mean:.3}"), self.size, SIDE, |i| flip[i])?);
+        }
+        Ok(mean)
     }
 
     /// The viewer's markup, which its script makes visible.

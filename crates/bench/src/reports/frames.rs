@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use serde_json::json;
 
-use super::{Entry, FrameTiming, ReportsOptions};
+use super::{Entry, FrameTiming, ReportsOptions, Subject};
 use crate::accel::{self, AccelKind, Accelerator};
 use crate::compile;
 use crate::desc::SceneDesc;
@@ -146,10 +146,7 @@ pub fn measure(comparison: FrameBenchmark, kind: Kind) -> Result<(Vec<Found>, Sp
             }
             if round == 0 {
                 different[i] = different_pixels(&image, &pictures[which]);
-                let step = (timed.rays.len() / COUNTED).max(1);
-                let counts: Option<Vec<f64>> =
-                    timed.rays.iter().step_by(step).map(|ray| (subject.tests)(&*subject.accel, ray)).collect();
-                tests[i] = counts.map(|counts| counts.iter().sum::<f64>() / counts.len().max(1) as f64);
+                tests[i] = tests_per_ray(subject, &timed.rays);
             }
         }
     }
@@ -165,6 +162,13 @@ pub fn measure(comparison: FrameBenchmark, kind: Kind) -> Result<(Vec<Found>, Sp
         different_pixels: different[i],
     };
     Ok(((0..entries.len()).take_while(|i| !times[*i][0].is_empty()).map(found).collect(), all))
+}
+
+/// The mean number of triangles tested for some of these rays, if that is known.
+fn tests_per_ray(subject: &Subject, rays: &[Ray]) -> Option<f64> {
+    let some = rays.iter().step_by((rays.len() / COUNTED).max(1));
+    let counts: Option<Vec<f64>> = some.map(|ray| (subject.tests)(&*subject.accel, ray)).collect();
+    counts.map(|counts| counts.iter().sum::<f64>() / counts.len().max(1) as f64)
 }
 
 fn different_pixels(a: &Image, b: &Image) -> usize {

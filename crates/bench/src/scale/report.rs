@@ -231,9 +231,10 @@ impl Report for ScaleReport {
     /// One line a run.
     fn sheet(&self) -> Option<Table> {
         let heads = "sweep | at | repeat | width | height | spp | depth | threads | accelerator | triangles | \
-                     instances | lights | load_seconds | build_seconds | first_pass_seconds | render_seconds | processor_seconds | \
-                     samples | rays | mesh_bytes | accelerator_bytes | film_bytes_per_pixel | start_bytes | \
-                     made_bytes | load_peak_bytes | build_peak_bytes | before_render_bytes | render_peak_bytes";
+                     instances | lights | load_seconds | build_seconds | first_pass_seconds | render_seconds | \
+                     processor_seconds | samples | rays | mesh_bytes | accelerator_bytes | film_bytes_per_pixel \
+                     | start_bytes | made_bytes | load_peak_bytes | build_peak_bytes | before_render_bytes | \
+                     render_peak_bytes";
         let mut sheet = Table::new("", heads);
         let points = self.sweeps.iter().flat_map(|sweep| sweep.points.iter().map(move |point| (sweep, point)));
         for (sweep, point) in points {
