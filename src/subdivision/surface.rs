@@ -282,8 +282,8 @@ impl RefinedSurface {
         let is_cut_short = self.is_adaptive && count > 0 && per_face * (kept + 4 * count) > max_triangles;
         self.is_cut_short |= is_cut_short;
         let is_end = count == 0 || is_cut_short;
-        for face in 0..self.faces.len() {
-            if self.is_real[face] && (is_end || !chosen[face]) {
+        for (face, &is_real) in self.is_real.iter().enumerate() {
+            if is_real && (is_end || !chosen[face]) {
                 let range = self.faces.corners(face);
                 self.leaves
                     .push(self.sources[face], self.channels.iter().map(|channel| &channel.corners[range.clone()]));
