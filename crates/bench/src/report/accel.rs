@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::{
-    Curve, Curves, Dots, Drawing, Figure, Page, Picture, Report, Section, Table, count, heat, interrupted, number,
-    or_dash,
+    Curve, Curves, DotRow, Dots, Drawing, Figure, Page, Picture, Report, Section, Table, count, heat, interrupted,
+    number, or_dash,
 };
 use crate::{AccelReport, Machine, Mode, NodeMap, RayKind, ScalingPoint, ScalingReport, SceneReport, Spent};
 
@@ -154,7 +154,7 @@ fn scene_line(scene: &SceneReport) -> String {
 }
 
 /// Single rays of every accelerator, and batches where there are any, by kind of ray.
-fn rates_of_one_thread(scene: &SceneReport) -> Vec<(String, Vec<(String, [f64; 3])>)> {
+fn rates_of_one_thread(scene: &SceneReport) -> Vec<(String, Vec<DotRow>)> {
     let rows = |kind: RayKind| {
         let row = |accel: &AccelReport, mode: Mode| {
             let how = if mode == Mode::Single { String::new() } else { format!(", {}", mode.name()) };

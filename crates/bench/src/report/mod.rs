@@ -10,7 +10,7 @@ mod reports;
 
 pub use accel::AccelsReport;
 pub(super) use picture::{Picture, base64, heat, thumbnail};
-pub(super) use plot::{Curve, Curves, Dots};
+pub(super) use plot::{Curve, Curves, DotRow, Dots};
 
 use std::path::Path;
 

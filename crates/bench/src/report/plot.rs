@@ -57,10 +57,13 @@ pub struct Curves {
     pub marks: Vec<(f64, f64)>,
 }
 
-/// Values by group and row, each with the ends of its whisker.
+/// The name of a row, and its value with the ends of its whisker.
+pub type DotRow = (String, [f64; 3]);
+
+/// Values by group and row.
 pub struct Dots {
     pub unit: String,
-    pub groups: Vec<(String, Vec<(String, [f64; 3])>)>,
+    pub groups: Vec<(String, Vec<DotRow>)>,
     /// A value of interest.
     pub mark: Option<f64>,
 }
