@@ -16,6 +16,8 @@ const LINE: f64 = 15.0;
 
 /// Mean width of a character.
 const CHARACTER: f64 = 7.0;
+/// Of bold ones.
+const BOLD: f64 = 7.8;
 
 /// Characters of a line of a name at the end of a curve.
 const NAME: usize = 22;
@@ -196,8 +198,9 @@ fn cut(text: &str, most: usize) -> String {
     text.chars().take(most - 1).chain(['…']).collect()
 }
 
+/// Of the bold lines of a name.
 fn width(lines: &[String]) -> f64 {
-    lines.iter().map(|line| line.chars().count()).max().unwrap_or(0) as f64 * CHARACTER
+    lines.iter().map(|line| line.chars().count()).max().unwrap_or(0) as f64 * BOLD
 }
 
 fn text(content: &str, [x, y]: [f64; 2], anchor: &str, class: &str) -> Text {
