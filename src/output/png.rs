@@ -18,7 +18,7 @@ use crate::film::{Crop, Image, LayerKind};
 /// hold exactly is not dithered.
 ///
 /// # Errors
-/// [`Error::Output`](crate::Error::Output) if the file cannot be written.
+/// [`Error::Output`] if the file cannot be written.
 pub fn write_png(path: &Path, image: &Image, exposure: f32, view: ViewDesc) -> Result<()> {
     write_atomically(path, |out| write_bytes(out, image, exposure, view))
 }
@@ -26,7 +26,7 @@ pub fn write_png(path: &Path, image: &Image, exposure: f32, view: ViewDesc) -> R
 /// The file that [`write_png`] writes.
 ///
 /// # Errors
-/// [`Error::Internal`](crate::Error::Internal) if the picture has no pixels.
+/// [`Error::Internal`] if the picture has no pixels.
 pub fn encode_png(image: &Image, exposure: f32, view: ViewDesc) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     write_bytes(&mut bytes, image, exposure, view).map_err(Error::Internal)?;

@@ -126,7 +126,7 @@ impl Rendering {
     /// A layer of Cryptomatte with `depth` ranks, an even number, by its name, such as `crypto_object`.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::Error::Usage) for another layer, one that was not rendered, or another depth.
+    /// [`Error::Usage`] for another layer, one that was not rendered, or another depth.
     pub fn cryptomatte(&self, layer: &str, depth: u32) -> Result<Matte> {
         let output = OutputDesc { crypto_depth: Some(depth), ..OutputDesc::new("") };
         output::check_output(&output)?;
@@ -143,7 +143,7 @@ impl Rendering {
     /// output of the settings with the same name, else like the first one of the same format.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::Error::Usage) for another extension; [`Error::Output`](crate::Error::Output) if the file
+    /// [`Error::Usage`] for another extension; [`Error::Output`] if the file
     /// cannot be written, in which case nothing is left behind.
     pub fn save(&self, file: impl AsRef<Path>) -> Result<()> {
         self.save_as(&self.output(file.as_ref())?)
