@@ -1,7 +1,7 @@
 //! Paths through media: where the medium changes, and what is absorbed on the way.
 
 use super::World;
-use super::path::Arrival;
+use super::path::SegmentVertex;
 use crate::bsdf::Bsdf;
 use crate::color::Rgb;
 use crate::geometry::{Hit, SurfaceInteraction};
@@ -27,9 +27,9 @@ pub(super) struct MediaState {
     /// At a boundary between media: the index of refraction of the inside over that of the outside.
     pub ior: Option<f32>,
     /// If its end is a point of a medium: the way there, if distances on it were chosen for lights.
-    pub arrival: Option<Arrival>,
+    pub arrival: Option<SegmentVertex>,
     /// The same for its last vertex.
-    pub departure: Option<Arrival>,
+    pub departure: Option<SegmentVertex>,
 }
 
 /// The part of a ray before the first surface that scatters: up to there it passes boundaries within one medium.

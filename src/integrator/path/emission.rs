@@ -2,7 +2,7 @@
 
 use super::Context;
 use super::caustics::CausticState;
-use super::equiangular::{Arrival, DirectionPdfs};
+use super::equiangular::{DirectionPdfs, SegmentVertex};
 use super::radiance::Output;
 use super::wave::{PathRows, Wave};
 use crate::color::Rgb;
@@ -68,7 +68,7 @@ struct Met<'a> {
     i: usize,
     ray: Ray,
     caustic: Option<&'a CausticState>,
-    departure: Option<&'a Arrival>,
+    departure: Option<&'a SegmentVertex>,
 }
 
 impl Met<'_> {

@@ -19,7 +19,7 @@ use crate::sampling::{PixelSeed, power_heuristic};
 
 /// A vertex at a distance on the way through a medium on which another was chosen for a light.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::integrator) struct Arrival {
+pub(in crate::integrator) struct SegmentVertex {
     pub segment: FirstSegment,
     pub distance: f32,
 }
@@ -33,19 +33,19 @@ pub(super) struct DirectionPdfs {
     pub phase: f32,
 }
 
-impl Arrival {
+impl SegmentVertex {
     /// Share of the strategies at a vertex, against that of [`add`], in the light that arrives there.
     pub(super) fn share(&self, context: &Context, id: LightId, pdfs: DirectionPdfs) -> f32 {
         let p = self.segment.way.origin + self.segment.way.direction.as_dvec3() * f64::from(self.distance);
-        let Some(on_the_way) = on_the_way(context, &self.segment, id, self.distance) else { return 1.0 };
+        let Some(equiangular_pdf) = equiangular_pdf(context, &self.segment, id, self.distance) else { return 1.0 };
         let pmf = context.scene.lights.pmf(id, &LightSampleContext { p, n: Vec3::ZERO }, context.compensation);
         let at_vertex = self.segment.pdf(context.world, self.distance) * (pmf * pdfs.light + pdfs.phase);
-        power_heuristic(at_vertex, on_the_way * pdfs.light)
+        power_heuristic(at_vertex, equiangular_pdf * pdfs.light)
     }
 }
 
 /// The density with which [`add`] chooses a light and a distance.
-fn on_the_way(context: &Context, segment: &FirstSegment, id: LightId, distance: f32) -> Option<f32> {
+fn equiangular_pdf(context: &Context, segment: &FirstSegment, id: LightId, distance: f32) -> Option<f32> {
     let by_angle = context.scene.lights.get(id).equiangular(&context.scene.geometry, &segment.way)?;
     Some(by_angle.pdf(distance) * context.scene.lights.pmf(id, &chooser(segment), context.compensation))
 }
@@ -61,7 +61,7 @@ pub(super) fn is_enabled(context: &Context) -> bool {
 }
 
 /// A path on its way through a medium.
-pub(super) struct OnTheWay<'a> {
+pub(super) struct SegmentPath<'a> {
     /// Index in the wave.
     pub index: usize,
     pub slot: u32,
@@ -76,7 +76,7 @@ pub(super) struct OnTheWay<'a> {
 }
 
 /// Adds the light that arrives at a chosen distance; the result is how many rays that took.
-pub(super) fn add(context: &Context, wave: &Wave, path: &OnTheWay, segment: &FirstSegment, out: &mut Output) -> u64 {
+pub(super) fn add(context: &Context, wave: &Wave, path: &SegmentPath, segment: &FirstSegment, out: &mut Output) -> u64 {
     let scene = context.scene;
     let set = dimensions::equiangular(context.bounce);
     let u = context.config.sampler.sample_4d(PixelSeed(path.seed), path.sample, set);
@@ -86,18 +86,18 @@ pub(super) fn add(context: &Context, wave: &Wave, path: &OnTheWay, segment: &Fir
     let light = scene.lights.get(choice.id);
     let Some(by_angle) = light.equiangular(&scene.geometry, &segment.way) else { return 0 };
     let distance = by_angle.sample(path.u[0]);
-    let on_the_way = by_angle.pdf(distance) * choice.pmf;
+    let equiangular_pdf = by_angle.pdf(distance) * choice.pmf;
     let direction = segment.way.direction;
     let p = segment.way.origin + direction.as_dvec3() * f64::from(distance);
     let sample = light.sample(&scene.geometry, &scene.textures, p, [u[0], u[1]], context.compensation);
-    let Some(sample) = sample.filter(|_| on_the_way > 0.0 && distance.is_finite()) else { return 0 };
+    let Some(sample) = sample.filter(|_| equiangular_pdf > 0.0 && distance.is_finite()) else { return 0 };
     let medium = scene.media.get(segment.medium);
     let phase = medium.phase.pdf(-direction, sample.wi);
     let is_mis = context.config.strategy == Strategy::Mis && !sample.is_delta;
     let pdfs = DirectionPdfs { light: sample.pdf, phase: if is_mis { phase } else { 0.0 } };
-    let weight = 1.0 - Arrival { segment: *segment, distance }.share(context, choice.id, pdfs);
+    let weight = 1.0 - SegmentVertex { segment: *segment, distance }.share(context, choice.id, pdfs);
     let scattered = transmittance(medium.extinction(), distance) * medium.scattering * phase;
-    let factor = weight / (on_the_way * sample.pdf);
+    let factor = weight / (equiangular_pdf * sample.pdf);
     let contribution = path.throughput * scattered * sample.radiance * factor;
     if contribution.is_black() || !contribution.is_finite() {
         return 0;

@@ -2,7 +2,7 @@
 
 use super::Context;
 use super::block::{Vertices, spawn};
-use super::equiangular::{self, Arrival, DirectionPdfs, OnTheWay};
+use super::equiangular::{self, DirectionPdfs, SegmentPath, SegmentVertex};
 use super::radiance::Output;
 use super::wave::{PathRows, Wave, path_flags};
 use crate::color::Rgb;
@@ -124,7 +124,7 @@ pub(super) fn scatter(context: &Context, wave: &mut Wave, out: &mut Output) -> u
         let is_first = path.passed == 0 && path.hit.is_some_and(|hit| hit.instance == Hit::MEDIUM);
         state.arrival = first.filter(|_| is_first).map(|segment| {
             let t = path.hit.map_or(0.0, |hit| hit.t);
-            Arrival { segment, distance: (t - ray.t_min) * ray.direction.length() }
+            SegmentVertex { segment, distance: (t - ray.t_min) * ray.direction.length() }
         });
         if !path.emitted.is_black() {
             let light = context.config.clamped(throughput * path.emitted, context.bounce);
@@ -139,7 +139,7 @@ pub(super) fn scatter(context: &Context, wave: &mut Wave, out: &mut Output) -> u
         }
         arrive(context, paths, i, state, path.ior);
         if let Some(segment) = first {
-            let on_the_way = OnTheWay {
+            let on_segment = SegmentPath {
                 index,
                 slot: paths.slot[i],
                 seed: paths.seed[i],
@@ -149,7 +149,7 @@ pub(super) fn scatter(context: &Context, wave: &mut Wave, out: &mut Output) -> u
                 time: ray.time,
                 u: [u[2], u[3]],
             };
-            wave.counts.shadow += equiangular::add(context, wave, &on_the_way, &segment, out);
+            wave.counts.shadow += equiangular::add(context, wave, &on_segment, &segment, out);
         }
     }
     passed

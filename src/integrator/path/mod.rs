@@ -38,7 +38,7 @@ use crate::film::LightAovRequest;
 use crate::light::MisCompensation;
 use crate::sampling::Sampler;
 use crate::scene::Scene;
-pub(super) use equiangular::Arrival;
+pub(super) use equiangular::SegmentVertex;
 use radiance::Output;
 use wave::Wave;
 

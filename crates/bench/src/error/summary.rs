@@ -149,7 +149,7 @@ pub struct EqualError {
     /// Seconds by variant, between the points measured on straight lines of the logarithms; where a variant was better
     /// from the start, what follows from its first point with a slope of -1.
     pub seconds: Vec<Option<f64>>,
-    /// By variant: how many times as fast as the first it is, each repeat by itself; median, lowest and highest.
+    /// By variant: how many times as fast as the first it is, for each repeat; median, lowest and highest.
     pub times_as_fast: Vec<Option<[f64; 3]>>,
 }
 

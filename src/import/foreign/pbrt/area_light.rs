@@ -2,7 +2,8 @@
 
 use super::colors::{Colors, Meaning};
 use super::params::Params;
-use crate::desc::{ColorSpaceDesc, EmissionDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
+use super::textures::bilinear_image;
+use crate::desc::{ColorSpaceDesc, EmissionDesc, WrapDesc, WrapModeDesc};
 use crate::error::Result;
 use crate::import::foreign::Draft;
 
@@ -40,17 +41,7 @@ impl AreaLight {
         let power = params.number("power")?.filter(|power| *power > 0.0);
         let two_sided = params.bool_or("twosided", false)?;
         let texture = params.string("filename")?.map(|file| {
-            let image = TextureDesc::Image {
-                file: file.into(),
-                color_space: ColorSpaceDesc::Srgb,
-                filter: TextureFilterDesc::Bilinear,
-                wrap: WrapDesc::Both(WrapModeDesc::Clamp),
-                scale: [1.0; 2],
-                rotation_degrees: 0.0,
-                offset: [0.0; 2],
-                channel: None,
-                invert: false,
-            };
+            let image = bilinear_image(file, ColorSpaceDesc::Srgb, WrapDesc::Both(WrapModeDesc::Clamp));
             draft.add_texture("emission", &params.place, image)
         });
         if texture.is_some() && power.is_some() {

@@ -4,10 +4,11 @@ use super::colors::{Colors, Meaning};
 use super::octahedral;
 use super::params::Params;
 use super::state::{Ctm, World, matrix, rotation_and_scale};
+use super::textures::bilinear_image;
 use crate::assets::{RgbImage, read_image, read_rgb_image};
 use crate::desc::{
     ColorSpaceDesc, DirectionalLightDesc, EnvironmentLightDesc, LightDesc, PointLightDesc, ProjectorLightDesc,
-    SpotLightDesc, TextureDesc, TextureFilterDesc, WrapDesc,
+    SpotLightDesc, WrapDesc,
 };
 use crate::error::Result;
 use crate::import::foreign::Draft;
@@ -107,17 +108,7 @@ impl Lights<'_> {
             draft.approximated(&params.place, &params.element, "transform", "the picture is not mirrored");
         }
         let scale = params.number_or("scale", 1.0)? * self.exposure;
-        let texture = TextureDesc::Image {
-            file: file.into(),
-            color_space: ColorSpaceDesc::Auto,
-            filter: TextureFilterDesc::Bilinear,
-            wrap: WrapDesc::default(),
-            scale: [1.0; 2],
-            rotation_degrees: 0.0,
-            offset: [0.0; 2],
-            channel: None,
-            invert: false,
-        };
+        let texture = bilinear_image(file, ColorSpaceDesc::Auto, WrapDesc::default());
         Ok(LightDesc::Projector(ProjectorLightDesc {
             position: map.translation.to_array(),
             look_at: (map.translation + map.matrix3.z_axis.normalize_or_zero()).to_array(),

@@ -2,11 +2,11 @@
 
 use super::colors::{Colors, Meaning};
 use super::params::Params;
+use super::textures::bilinear_image;
 use super::textures::{Texture, Textures};
 use crate::desc::{
     BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, DistributionDesc, HairDesc, HairIor, HairRoughness,
-    HairTilt, MaterialDesc, NormalMapDesc, PlasticDesc, RangedDesc, RoughnessDesc, TextureDesc, TextureFilterDesc,
-    WrapDesc,
+    HairTilt, MaterialDesc, NormalMapDesc, PlasticDesc, RangedDesc, RoughnessDesc, WrapDesc,
 };
 use crate::error::Result;
 use crate::import::foreign::Draft;
@@ -302,17 +302,7 @@ impl Materials<'_> {
             None => None,
             Some(file) => {
                 params.approximate("normalmap", "in the frame of MikkTSpace on meshes");
-                let image = TextureDesc::Image {
-                    file: file.into(),
-                    color_space: ColorSpaceDesc::Linear,
-                    filter: TextureFilterDesc::Bilinear,
-                    wrap: WrapDesc::default(),
-                    scale: [1.0; 2],
-                    rotation_degrees: 0.0,
-                    offset: [0.0; 2],
-                    channel: None,
-                    invert: false,
-                };
+                let image = bilinear_image(file, ColorSpaceDesc::Linear, WrapDesc::default());
                 let texture = self.draft.add_texture(&format!("{name}_normals"), &params.place, image);
                 Some(NormalMapDesc { texture, strength: 1.0, flip_y: false })
             }

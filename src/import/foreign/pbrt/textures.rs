@@ -338,3 +338,18 @@ fn image(draft: &mut Draft, name: &str, of_numbers: bool, params: &Params, color
     let name = draft.add_texture(name, &params.place, texture);
     Ok(Texture::Named { name, factor: [scale; 3] })
 }
+
+/// An image that a light or a material names itself, without a texture.
+pub fn bilinear_image(file: &str, color_space: ColorSpaceDesc, wrap: WrapDesc) -> TextureDesc {
+    TextureDesc::Image {
+        file: file.into(),
+        color_space,
+        filter: TextureFilterDesc::Bilinear,
+        wrap,
+        scale: [1.0; 2],
+        rotation_degrees: 0.0,
+        offset: [0.0; 2],
+        channel: None,
+        invert: false,
+    }
+}
