@@ -14,6 +14,7 @@ mod frames;
 mod import;
 mod live;
 mod log;
+mod opposites;
 mod state;
 mod texts;
 mod view;
@@ -22,10 +23,10 @@ use std::path::PathBuf;
 
 use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
-use steradian::Assignment;
 use steradian::desc::{CausticsDesc, IntegratorDesc, RouletteDesc, SamplerKindDesc, StrategyDesc, ViewDesc};
 use steradian::internal::accel::AccelKind;
-use steradian::internal::render::Overrides;
+use steradian::internal::render::{ExrOverrides, Overrides};
+use steradian::{Assignment, ExrChanges};
 
 use crate::names::{self, Layers};
 use crate::rerender::Repeat;
@@ -37,11 +38,12 @@ pub use bench_error::BenchErrorArgs;
 pub use bench_scale::BenchScaleArgs;
 pub use config::{ConfigCommand, ConfigShowArgs};
 pub use denoise::{DenoiseArgs, RenderDenoiseArgs};
-pub use exr::{CheckExrArgs, ExrArgs, RerenderArgs};
+pub use exr::{CheckExrArgs, RerenderArgs};
 pub use farm::{FarmCommand, JobArgs, SlurmArgs};
 pub use frames::SequenceArgs;
 pub use import::{ConvertArgs, ImportArgs};
 pub use log::{ColorChoice, LogArgs, LogFormat};
+pub use opposites::opposite;
 use state::MERGE_EXAMPLES;
 pub use state::{MergeArgs, StateArgs};
 pub use texts::FIRST_STEPS;
@@ -65,7 +67,7 @@ const COMMON_OPTIONS: [&str; 21] = [
     "accel",
     "threads",
     "time_limit",
-    "json",
+    "stats",
     "checkpoint",
     "resume",
     "preview",
@@ -73,10 +75,10 @@ const COMMON_OPTIONS: [&str; 21] = [
     "overwrite",
 ];
 
-/// The command line as it is parsed: the options that few need are absent from `-h`.
+/// The command line as it is parsed: the options that few need are absent from `-h`, and switches have opposites.
 pub fn command_line() -> clap::Command {
     Cli::command().mut_subcommand("render", |render| {
-        render.mut_args(|arg| {
+        opposites::added(render).mut_args(|arg| {
             let is_common = ["quiet", "verbose", "help"].iter().chain(&COMMON_OPTIONS).any(|id| arg.get_id() == *id);
             arg.hide_short_help(!is_common)
         })
@@ -114,7 +116,7 @@ pub enum Command {
     /// Editors check and complete scenes with it: save it and name it in the scene's "$schema".
     #[command(after_help = "Example:\n  steradian schema > scene.schema.json")]
     Schema {
-        /// Write the manual of the scene format as Markdown pages into this folder instead
+        /// Write Markdown pages into this folder instead: the manual of the scene format
         #[arg(long, value_name = "DIR")]
         markdown: Option<PathBuf>,
     },
@@ -178,10 +180,10 @@ pub enum Command {
     /// Print the manual page, or write those of all commands into a folder
     #[command(after_help = "Example:\n  steradian man --dir ~/.local/share/man/man1")]
     Man {
-        /// The folder.
+        /// Folder to write to: the manual pages of all commands
         #[arg(long, value_name = "DIR")]
         dir: Option<PathBuf>,
-        /// Write the reference of all commands as Markdown pages into this folder instead
+        /// Write Markdown pages into this folder instead: the reference of all commands
         #[arg(long, value_name = "DIR", conflicts_with = "dir")]
         markdown: Option<PathBuf>,
     },
@@ -232,6 +234,11 @@ pub struct RenderArgs {
     /// EXR: store 32-bit floats instead of 16-bit ones
     #[arg(long, help_heading = "Picture")]
     pub float: bool,
+    #[arg(long, hide = true)]
+    pub no_float: bool,
+    /// EXR files: set keys of the scene's outputs, such as profile=nuke,compression=piz; repeat for more
+    #[arg(long, value_name = "KEY=VALUE,...", long_help = exr::exr_help(), help_heading = "Picture")]
+    pub exr: Vec<ExrChanges>,
     /// PNG: exposure in stops; 1 is twice as bright
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true, help_heading = "Picture")]
     pub exposure: Option<f32>,
@@ -279,17 +286,11 @@ pub struct RenderArgs {
     /// samples of those before, and weighted by its inverse variance. Guiding ends where it does not pay. With
     /// --checkpoint and --resume the picture is the same bit for bit. Unsupported with --shard: each part would have to
     /// render nearly all samples to train the guide; --guide uses a trained one.
-    #[
-        arg(
-            long, value_name = "on|off", num_args = 0..=1, default_missing_value = "on", value_parser = parse_switch,
-            help_heading = "Algorithm"
-        )
-    ]
-    pub guiding: Option<bool>,
-    /// Do not guide paths, whatever the scene sets
-    #[arg(long, conflicts_with = "guiding", help_heading = "Algorithm")]
+    #[arg(long, help_heading = "Algorithm")]
+    pub guiding: bool,
+    #[arg(long, hide = true)]
     pub no_guiding: bool,
-    /// Guide paths by what another render has learned: the --checkpoint of one with --guiding on
+    /// Guide paths by what another render has learned: the --checkpoint of one with --guiding
     ///
     /// The guide is not trained further, whatever --guiding says. Samples then depend on it alone, so that --shard,
     /// --pixel, --target-error and --resume with more samples work as without guiding. The scene, the camera and the
@@ -315,6 +316,8 @@ pub struct RenderArgs {
     /// Do not show the background to the camera: alpha is 0 there
     #[arg(long, help_heading = "Picture")]
     pub transparent: bool,
+    #[arg(long, hide = true)]
+    pub no_transparent: bool,
     /// Ray accelerator: auto, embree, packets, bvh, kdtree, octree or linear, with options such as embree:high
     #[arg(long, value_name = "NAME", long_help = accel_help(), help_heading = "Algorithm")]
     pub accel: Option<AccelKind>,
@@ -326,16 +329,14 @@ pub struct RenderArgs {
     #[arg(long, value_name = "SECONDS", help_heading = "Run")]
     pub time_limit: Option<f64>,
     /// Write statistics as JSON to this file; - for stdout
-    #[arg(long, value_name = "STATS", help_heading = "Run")]
-    pub json: Option<PathBuf>,
+    #[arg(long, value_name = "FILE", help_heading = "Run")]
+    pub stats: Option<PathBuf>,
     /// Replay samples of this pixel alone and print their values; nothing is written
     #[arg(long, value_name = "X,Y", value_parser = parse_list::<u32, 2>, requires = "sample", hide = true)]
     pub pixel: Option<[u32; 2]>,
     /// The sample to replay, counted from 0
     #[arg(long, value_name = "I", requires = "pixel", hide = true)]
     pub sample: Option<u32>,
-    #[command(flatten)]
-    pub exr: ExrArgs,
     /// A picture to be made again.
     #[arg(skip)]
     pub repeat: Option<Box<Repeat>>,
@@ -369,7 +370,7 @@ pub struct Verbosity {
 pub struct InfoArgs {
     /// The scene file: .json, .xml (Mitsuba 3), .pbrt (pbrt-v4), .gltf or .glb
     pub scene: PathBuf,
-    /// As JSON
+    /// Print JSON
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]
@@ -401,7 +402,7 @@ pub struct CompareArgs {
     pub reference: PathBuf,
     /// The picture to judge, an EXR file of the same size
     pub test: PathBuf,
-    /// As JSON
+    /// Print JSON
     #[arg(long)]
     pub json: bool,
 }
@@ -416,7 +417,7 @@ impl Command {
             Self::Merge(arguments) => only(arguments.quiet),
             Self::Rerender(arguments) => only(arguments.quiet),
             Self::Denoise(arguments) => only(arguments.quiet),
-            Self::Convert(arguments) => Verbosity { quiet: arguments.quiet, verbose: arguments.verbose },
+            Self::Convert(arguments) => arguments.verbosity,
             _ => Verbosity::default(),
         }
     }
@@ -443,33 +444,33 @@ impl RenderArgs {
             accel: self.accel,
             sampler: self.sampler,
             no_depth_of_field: self.no_depth_of_field,
-            transparent: self.transparent,
+            transparent: switch(self.transparent, self.no_transparent),
             max_depth: self.max_depth,
             strategy: self.strategy,
             roulette: self.roulette,
             clamp: self.clamp,
             regularize: self.regularize,
             caustics: self.caustics,
-            guiding: if self.no_guiding { Some(false) } else { self.guiding },
+            guiding: switch(self.guiding, self.no_guiding),
             guide: None,
             time_limit: self.time_limit,
             outputs: self.output.clone(),
             default_outputs,
             layers: self.layers.iter().flat_map(|layers| layers.list()).collect(),
-            float: self.float,
-            exr: self.exr.overrides(self.sequence.frames.is_some().then_some(self.sequence.fps)),
+            float: switch(self.float, self.no_float),
+            exr: ExrOverrides {
+                frames_per_second: self.sequence.frames.is_some().then_some(self.sequence.fps),
+                ..ExrChanges::merged(&self.exr)
+            },
             exposure: self.exposure,
             view: self.view,
         }
     }
 }
 
-fn parse_switch(text: &str) -> Result<bool, String> {
-    match text.trim() {
-        "on" => Ok(true),
-        "off" => Ok(false),
-        _ => Err("expected on or off".to_owned()),
-    }
+/// What a switch and its opposite set: nothing if neither was given.
+fn switch(on: bool, off: bool) -> Option<bool> {
+    (on || off).then_some(on)
 }
 
 fn parse_size(text: &str) -> Result<[u32; 2], String> {
