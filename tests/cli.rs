@@ -19,7 +19,7 @@ fn faults_have_their_exit_codes_and_one_line() {
         ("render broken.json", 3),
         ("render missing.json", 4),
         ("render scene.json -o missing/a.exr", 5),
-        ("render scene.json --json missing/a.json", 5),
+        ("render scene.json --stats missing/a.json", 5),
         ("render scene.json --size 65536x65536", 33),
         ("compare a.exr b.exr", 4),
         ("--help", 0),
@@ -38,7 +38,7 @@ fn faults_have_their_exit_codes_and_one_line() {
 #[test]
 fn without_outputs_the_files_are_named_after_the_scene() {
     let folder = tempfile::tempdir().unwrap();
-    let output = run(folder.path(), "render scene.json --layers Z --json stats.json --accel embree");
+    let output = run(folder.path(), "render scene.json --layers Z --stats stats.json --accel embree");
     assert_eq!(output.status.code(), Some(0), "{}", stderr_of(&output));
     let stderr = stderr_of(&output);
     assert!(
@@ -77,7 +77,7 @@ fn without_outputs_the_files_are_named_after_the_scene() {
 #[test]
 fn quiet_runs_say_nothing_and_statistics_go_to_stdout() {
     let folder = tempfile::tempdir().unwrap();
-    let output = run(folder.path(), "render scene.json -q -o a.exr --json -");
+    let output = run(folder.path(), "render scene.json -q -o a.exr --stats -");
     assert_eq!((output.status.code(), stderr_of(&output).as_str()), (Some(0), ""));
     let stats: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(stats["outputs"], serde_json::json!(["a.exr"]));
@@ -149,7 +149,7 @@ fn signals_and_time_limits_end_a_pass_that_does_not_end() {
     assert_eq!(output.status.code(), Some(2), "{message}");
     assert!(message.contains("--time-limit 0.1: "), "{message}");
 
-    for options in ["", "--guiding on", "--target-error 0.1"] {
+    for options in ["", "--guiding", "--target-error 0.1"] {
         let mut child = limited(options);
         // The program listens as soon as the accelerator is built.
         let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();

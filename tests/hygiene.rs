@@ -107,7 +107,7 @@ fn options_come_from_the_strongest_place() {
     let user = folder.path().join("config/steradian/config.toml");
     std::fs::create_dir_all(user.parent().unwrap()).unwrap();
     let spp = |arguments: &str, variable: Option<(&str, &str)>| -> u64 {
-        let mut command = steradian(folder.path(), &format!("render scene.json -q -o a.exr --json - {arguments}"));
+        let mut command = steradian(folder.path(), &format!("render scene.json -q -o a.exr --stats - {arguments}"));
         let output = command.envs(variable).output().unwrap();
         serde_json::from_slice::<Value>(&output.stdout).unwrap()["spp"].as_u64().unwrap()
     };
@@ -132,7 +132,7 @@ fn options_come_from_the_strongest_place() {
     // The project's file lies beside the scene, not above it.
     std::fs::create_dir(folder.path().join("shot")).unwrap();
     std::fs::write(folder.path().join("shot/scene.json"), SCENE).unwrap();
-    let output = run(folder.path(), "render shot/scene.json -q -o a.exr --json -");
+    let output = run(folder.path(), "render shot/scene.json -q -o a.exr --stats -");
     assert_eq!(serde_json::from_slice::<Value>(&output.stdout).unwrap()["spp"], 3);
 }
 
@@ -160,7 +160,7 @@ fn farms_say_how_many_processors_a_task_has() {
         ("SLURM_CPUS_PER_TASK", "--threads 2", 2),
         ("STERADIAN_THREADS", "", 3),
     ] {
-        let mut command = steradian(folder.path(), &format!("render scene.json -o a.exr --json - -v {arguments}"));
+        let mut command = steradian(folder.path(), &format!("render scene.json -o a.exr --stats - -v {arguments}"));
         let output = command.env(variable, "3").output().unwrap();
         assert_eq!(serde_json::from_slice::<Value>(&output.stdout).unwrap()["threads"], threads, "{variable}");
         assert_eq!(

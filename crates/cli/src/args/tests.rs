@@ -21,7 +21,7 @@ fn the_definition_is_sound() {
 fn every_option_reaches_the_overrides() {
     let line = "-o a.exr -o b.png --spp 5 --size 20x10 --crop 1,2,3,4 --threads 2 --seed 9 --integrator path \
                 --accel linear --sampler independent --max-depth 3 --strategy light --clamp 2.5 --regularize 0.2 \
-                --caustics photons --guiding on --time-limit 1.5 --layers Z,albedo --float --exposure -1.5 \
+                --caustics photons --guiding --time-limit 1.5 --layers Z,albedo --float --exposure -1.5 \
                 --view filmic \
                 --no-depth-of-field --transparent -vv";
     let arguments = render(&line.split_whitespace().collect::<Vec<_>>()).unwrap();
@@ -89,8 +89,8 @@ fn guiding_is_a_switch() {
     assert_eq!(guiding("").unwrap(), None);
     assert_eq!(guiding("--guiding").unwrap(), Some(true));
     assert_eq!(guiding("--guiding -q").unwrap(), Some(true));
-    assert_eq!(guiding("--guiding on").unwrap(), Some(true));
-    assert_eq!(guiding("--guiding off").unwrap(), Some(false));
+    assert_eq!(guiding("--guiding").unwrap(), Some(true));
+    assert_eq!(guiding("--no-guiding").unwrap(), Some(false));
     assert_eq!(guiding("--no-guiding").unwrap(), Some(false));
     assert!(guiding("--guiding --no-guiding").is_err() && guiding("--guiding maybe").is_err());
 }

@@ -16,7 +16,7 @@ use steradian::internal::farm::{is_scene_per_frame, message_lines};
 use steradian::internal::suggestion::did_you_mean;
 use steradian::{Error, ExrChanges, Result};
 
-use crate::args::{self as cli, Cli, FIRST_STEPS, command_line, opposite};
+use crate::args::{self, Cli, FIRST_STEPS, command_line, opposite};
 use crate::log::{self, Level};
 pub use show::run as show;
 
@@ -98,7 +98,7 @@ pub fn parse() -> Result<Parsed> {
     let command = added.iter().fold(command, |command, setting| options.with_default(command, setting));
     let matches = command.try_get_matches_from(&line).unwrap_or_else(|error| exit(&error, &line));
     let mut cli = typed(&matches, &line);
-    if let cli::Command::Render(arguments) = &mut cli.command {
+    if let args::Command::Render(arguments) = &mut cli.command {
         // Those of the command line come later and count.
         for setting in &added {
             let Some(key) = setting.key.strip_prefix(EXR_KEYS) else { continue };
