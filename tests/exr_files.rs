@@ -102,7 +102,7 @@ fn every_profile_is_clean() {
     let dir = folder.path();
     render_profiles(dir);
     for profile in PROFILES {
-        let report = run_ok(dir, &format!("check-exr {profile}.exr --profile {profile} --strict"));
+        let report = run_ok(dir, &format!("check-exr {profile}.exr --profile {profile} --fail-on-warning"));
         assert!(report.contains("clean"), "{report}");
     }
     for profile in ["nuke", "blender"] {
@@ -250,7 +250,7 @@ fn checks_have_their_exit_codes() {
         ("check-exr a.exr --profile nuke", 0),
         ("check-exr warning.exr", 0),
         ("check-exr error.exr a.exr", 1),
-        ("check-exr warning.exr a.exr --strict", 1),
+        ("check-exr warning.exr a.exr --fail-on-warning", 1),
         ("check-exr broken.exr", 3),
         ("check-exr missing.exr", 4),
         ("check-exr", 2),

@@ -99,7 +99,10 @@ fn renders_overwrite_nothing_that_they_read() {
         ("render studio.json -o a.exr --report m.obj", ["m.obj (shapes[0].file)", "m.obj (--report)"]),
         ("render scene.json -o a.exr --report scene.json", ["scene.json (the scene)", "scene.json (--report)"]),
         ("render scene.json -o a.exr --stats link.json", ["scene.json (the scene)", "link.json (--stats)"]),
-        ("render link.json -o a.exr --stats sub/../scene.json", ["link.json (the scene)", "sub/../scene.json (--stats)"]),
+        (
+            "render link.json -o a.exr --stats sub/../scene.json",
+            ["link.json (the scene)", "sub/../scene.json (--stats)"],
+        ),
         ("render scene.json -o a.exr --log-file scene.json", ["scene.json (the scene)", "scene.json (--log-file)"]),
         (
             "render scene.json -o a.exr --checkpoint scene.json --resume",
