@@ -35,6 +35,27 @@ fn faults_have_their_exit_codes_and_one_line() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
 }
 
+/// A scene that does not exist is named even if an option's value is wrong, too.
+#[test]
+fn a_missing_scene_and_a_wrong_value_are_both_reported() {
+    let folder = tempfile::tempdir().unwrap();
+    for (arguments, missing) in [
+        ("render missing.json --layers Q", true),
+        ("render --spp many missing.json", true),
+        ("info missing.json --time x", true),
+        ("render scene.json --layers Q", false),
+        ("render shot.####.json --frames 1-2 --layers Q", false),
+    ] {
+        let output = run(folder.path(), arguments);
+        let text = stderr_of(&output);
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {text}");
+        assert_eq!(text.starts_with("error: missing.json: no such file\n"), missing, "{arguments}: {text}");
+        assert!(text.contains("error: invalid value"), "{arguments}: {text}");
+    }
+    let old = stderr_of(&run(folder.path(), "render scene.json --owner me"));
+    assert!(old.contains("In place of --owner: --exr owner=TEXT"), "{old}");
+}
+
 #[test]
 fn without_outputs_the_files_are_named_after_the_scene() {
     let folder = tempfile::tempdir().unwrap();
@@ -217,7 +238,7 @@ fn the_short_help_shows_the_common_options() {
     assert!(!short.contains(&"--log-file".to_owned()) && long.contains(&"--log-file".to_owned()));
 
     let help = String::from_utf8(run(folder.path(), "render --help").stdout).unwrap();
-    for value in ["- mis:", "- N:", "- agx:", "- whitted:", "- zips:"] {
+    for value in ["- mis:", "- N:", "- agx:", "- whitted:", "zips           Deflate line by line"] {
         assert!(help.contains(value), "{value} has no description: {help}");
     }
     let help = String::from_utf8(run(folder.path(), "bench scale --help").stdout).unwrap();

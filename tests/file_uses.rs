@@ -137,7 +137,8 @@ fn no_two_things_are_written_to_one_file() {
         ("render scene.json --shard 1/2 -o c.shard --checkpoint ./c.shard", ["(--output)", "(--checkpoint)"]),
         ("render scene.json --stats scene.png", ["scene.png (output)", "scene.png (--stats)"]),
         (
-            "render scene.json -o o.exr --layers crypto_object --exr crypto_manifest=sidecar --stats o.CryptoObject.json",
+            "render scene.json -o o.exr --layers crypto_object --exr crypto_manifest=sidecar \
+             --stats o.CryptoObject.json",
             ["o.CryptoObject.json (output)", "(--stats)"],
         ),
     ] {

@@ -60,8 +60,8 @@ pub struct JobArgs {
     /// Samples per pixel, all shards together
     #[arg(long, value_name = "N")]
     pub spp: Option<u32>,
-    /// Folder to write to: shards and checkpoints. It has to be the same for all machines. Default: SCENE.farm in the working
-    /// directory
+    /// Folder to write to: shards and checkpoints. It has to be the same for all machines. Default: SCENE.farm in the
+    /// working directory
     #[arg(long, value_name = "DIR")]
     pub dir: Option<PathBuf>,
     /// Write the checkpoint at least this often

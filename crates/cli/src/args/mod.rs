@@ -17,6 +17,7 @@ mod log;
 mod opposites;
 mod state;
 mod texts;
+mod values;
 mod view;
 
 use std::path::PathBuf;
@@ -48,6 +49,7 @@ use state::MERGE_EXAMPLES;
 pub use state::{MergeArgs, StateArgs};
 pub use texts::FIRST_STEPS;
 use texts::{EXAMPLES, RENDER_EXAMPLES, RENDER_SHORT_EXAMPLES};
+use values::{accel_help, parse_list, parse_size};
 pub use view::ViewArgs;
 
 /// Options of `render` that `-h` shows; `--help` shows all.
@@ -234,6 +236,7 @@ pub struct RenderArgs {
     /// EXR: store 32-bit floats instead of 16-bit ones
     #[arg(long, help_heading = "Picture")]
     pub float: bool,
+    /// The opposite of --float
     #[arg(long, hide = true)]
     pub no_float: bool,
     /// EXR files: set keys of the scene's outputs, such as profile=nuke,compression=piz; repeat for more
@@ -288,6 +291,7 @@ pub struct RenderArgs {
     /// render nearly all samples to train the guide; --guide uses a trained one.
     #[arg(long, help_heading = "Algorithm")]
     pub guiding: bool,
+    /// The opposite of --guiding
     #[arg(long, hide = true)]
     pub no_guiding: bool,
     /// Guide paths by what another render has learned: the --checkpoint of one with --guiding
@@ -316,6 +320,7 @@ pub struct RenderArgs {
     /// Do not show the background to the camera: alpha is 0 there
     #[arg(long, help_heading = "Picture")]
     pub transparent: bool,
+    /// The opposite of --transparent
     #[arg(long, hide = true)]
     pub no_transparent: bool,
     /// Ray accelerator: auto, embree, packets, bvh, kdtree, octree or linear, with options such as embree:high
@@ -471,30 +476,6 @@ impl RenderArgs {
 /// What a switch and its opposite set: nothing if neither was given.
 fn switch(on: bool, off: bool) -> Option<bool> {
     (on || off).then_some(on)
-}
-
-fn parse_size(text: &str) -> Result<[u32; 2], String> {
-    let parse = || {
-        let (width, height) = text.split_once(['x', 'X'])?;
-        Some([width.trim().parse().ok()?, height.trim().parse().ok()?])
-    };
-    parse().ok_or_else(|| "expected WIDTHxHEIGHT, such as 1920x1080".to_owned())
-}
-
-fn parse_list<T: std::str::FromStr, const N: usize>(text: &str) -> Result<[T; N], String> {
-    let numbers: Option<Vec<T>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
-    numbers
-        .and_then(|numbers| numbers.try_into().ok())
-        .ok_or_else(|| format!("expected {N} whole numbers, separated by commas"))
-}
-
-fn accel_help() -> String {
-    let line = |(name, what): &(&str, &str)| format!("  {name:<16}{what}");
-    let lines: Vec<_> = AccelKind::CHOICES.iter().map(line).collect();
-    format!(
-        "Ray accelerator; all give the same picture within rounding. Options combine, as in embree:low+compact\n\n{}",
-        lines.join("\n")
-    )
 }
 
 #[cfg(test)]

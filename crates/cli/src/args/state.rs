@@ -34,7 +34,8 @@ pub struct StateArgs {
         )
     ]
     pub every: Duration,
-    /// Continue an interrupted run: from the checkpoint, if there is one; the picture is the same bit for bit as without the interruption
+    /// Continue an interrupted run: from the checkpoint, if there is one; the picture is the same bit for bit as
+    /// without the interruption
     #[arg(long, requires = "checkpoint", help_heading = "State")]
     pub resume: bool,
     /// Render only part I of N of the samples of every pixel, counted from 1, into a file for `steradian merge`
