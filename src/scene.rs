@@ -1,5 +1,5 @@
-//! A scene ready to render: tables and ids, no paths, and no names but those of layers (light groups, objects, materials)
-//! and of materials that may be replaced.
+//! A scene ready to render: tables and ids, no paths, and no names but those of layers (light groups, objects,
+//! materials) and of materials that may be replaced.
 
 use std::borrow::Cow;
 use std::collections::HashMap;

@@ -12,7 +12,8 @@ use crate::render::Settings;
 
 impl Renderer {
     /// Replaces the camera. The accelerator is kept; the scene is compiled again only if it has planes, which reach
-    /// beyond the camera, or subdivision that follows it, or the shutter is another. A fault of the camera is an error of the next render.
+    /// beyond the camera, or subdivision that follows it, or the shutter is another. A fault of the camera is an error
+    /// of the next render.
     pub fn set_camera(&mut self, camera: CameraDesc) -> &mut Self {
         self.imported.desc.camera = camera;
         self.changed().camera = true;

@@ -193,7 +193,7 @@ fn subdivision_follows_the_camera_and_the_film() {
     (desc.film.width, desc.film.height, desc.sampler.spp) = (24, 16, 1);
     let mut renderer = Renderer::from_desc(desc);
     renderer.render().unwrap();
-    for (path, value) in [("camera.position", json!([0, 0.5, 2.5])), ("film.width", json!(96))] {
+    for (path, value) in [("camera.position", json!([0, 0.5, 2.5])), ("film.height", json!(64))] {
         let before = geometry(&renderer);
         renderer.change(path, value).unwrap();
         let changed = renderer.render().unwrap().into_image();

@@ -1,6 +1,6 @@
 //! The library's public interface as text: `cargo xtask api` writes `api.txt` from the pages that `cargo doc` makes,
-//! and `cargo xtask api --check` fails if the file is not up to date, so that no change of the interface goes unseen. With
-//! `--documented` the pages are those of the last `cargo doc`, which must have left out private items.
+//! and `cargo xtask api --check` fails if the file is not up to date, so that no change of the interface goes unseen.
+//! With `--documented` the pages are those of the last `cargo doc`, which must have left out private items.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -44,7 +44,7 @@ pub(super) fn c10_quadratic_solver(effort: Effort) -> Outcome {
             }
             (None, None) => {}
             (found, exact) => {
-                other_count.require(false, || format!("{a:?}, {b:?}, {c:?} have {found:?} in place of {exact:?}"))
+                other_count.require(false, || format!("{a:?}, {b:?}, {c:?} have {found:?} in place of {exact:?}"));
             }
         }
     }
