@@ -405,7 +405,7 @@ impl DielectricDesc {
 
 impl MaterialDesc {
     /// The names of the materials that it consists of.
-    pub fn part_names(&self) -> Vec<&str> {
+    pub(crate) fn part_names(&self) -> Vec<&str> {
         match self {
             Self::Mix { materials: [first, second], .. } => vec![first, second],
             Self::TwoSided { front, back } => vec![front, back],
