@@ -11,6 +11,8 @@ mod packet;
 mod replay;
 mod scene;
 mod sys;
+#[cfg(test)]
+mod tests;
 
 pub use device::EmbreeInfo;
 pub use replay::EmbreeReplay;
