@@ -97,6 +97,11 @@ impl Hair {
         }
     }
 
+    /// This hair with another absorption per radius.
+    pub fn with_absorption(self, sigma_a: Rgb) -> Self {
+        Self { sigma_a, ..self }
+    }
+
     /// Value and density for a pair of directions.
     pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
         let side = 1f32.copysign(wo.z);

@@ -114,6 +114,16 @@ impl UserShapes {
         ]
     }
 
+    /// Whether more than half of all primitives are curves that Embree intersects.
+    pub(super) fn are_mostly_curves(&self, geometry: &Geometry) -> bool {
+        let is_native = |data: &UserData| matches!(data, UserData::Curves(..));
+        let (all, curves) = self.0.iter().zip(&geometry.shapes).fold((0, 0), |(all, curves), (data, shape)| {
+            let count = shape.prim_count();
+            (all + count, curves + if is_native(data) { count } else { 0 })
+        });
+        2 * curves > all
+    }
+
     /// The entry of one shape.
     pub(super) fn get(&self, id: ShapeId) -> &UserData {
         &self.0[id.index()]
