@@ -55,7 +55,7 @@ fi
 case "${1:-render}" in
     render)
         # Without benchmarks and their dependencies, which a render does not need.
-        cargo run --release --locked --no-default-features -- render scenes/gallery.json -o gallery.exr -o gallery.png
+        cargo run --release --locked --package steradian-cli --no-default-features -- render scenes/gallery.json -o gallery.exr -o gallery.png
         echo "The picture: $PWD/gallery.png (for a screen) and $PWD/gallery.exr (linear, for compositing)" >&2
         ;;
     test) cargo test --locked ;;
