@@ -32,6 +32,24 @@ pub(super) enum UserData {
     Curves(sys::StCurves, #[allow(dead_code)] Box<Filter>),
 }
 
+impl UserData {
+    /// That of curves or points.
+    fn of_primitives(shape: &Shape, has_holes: bool, filter: Box<Filter>) -> Self {
+        let primitives = sys::StUserPrimitives {
+            shape: std::ptr::from_ref(&*filter).cast::<c_void>(),
+            count: shape.prim_count() as u32,
+            intersect: Some(intersect_primitive),
+            bounds: Some(primitive_bounds),
+        };
+        match shape {
+            Shape::Curves(curves) if !has_holes && curves.is_swept_disk() => {
+                Self::Curves(sys::StCurves { primitives, reach: CONFIRMED_RADII * curves.max_radius() }, filter)
+            }
+            _ => Self::Primitives(primitives, filter),
+        }
+    }
+}
+
 /// The user data of every shape, by [`ShapeId`].
 pub(super) struct UserShapes(Vec<UserData>);
 
@@ -86,19 +104,7 @@ impl UserShapes {
                 }
                 (Shape::Curves(_) | Shape::Points(_), filter) => {
                     let filter = filter.unwrap_or_else(|| Box::new(Filter::new(geometry, id)));
-                    let primitives = sys::StUserPrimitives {
-                        shape: std::ptr::from_ref(&*filter).cast::<c_void>(),
-                        count: shape.prim_count() as u32,
-                        intersect: Some(intersect_primitive),
-                        bounds: Some(primitive_bounds),
-                    };
-                    match shape {
-                        Shape::Curves(curves) if !has_holes && curves.is_swept_disk() => {
-                            let reach = CONFIRMED_RADII * curves.max_radius();
-                            UserData::Curves(sys::StCurves { primitives, reach }, filter)
-                        }
-                        _ => UserData::Primitives(primitives, filter),
-                    }
+                    UserData::of_primitives(shape, has_holes, filter)
                 }
             }
         };
