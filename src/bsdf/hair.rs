@@ -13,7 +13,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::{BsdfEval, BsdfFlags, BsdfSample, fresnel};
 use crate::color::Rgb;
-use crate::math::{Vec3, vec3};
+use crate::math::{Vec3, unit_circle, vec3};
 
 /// Lobes, the last for all higher orders.
 const LOBES: usize = 4;
@@ -60,7 +60,7 @@ struct HairDirection {
 
 impl HairDirection {
     fn new(v: Vec3) -> Self {
-        let [x, y, z] = v.to_array().map(f64::from);
+        let (x, y, z) = (f64::from(v.x), f64::from(v.y), f64::from(v.z));
         // A direction is unit within rounding only.
         let across = (y * y + z * z).sqrt();
         let length = (x * x + across * across).sqrt();
@@ -130,7 +130,7 @@ impl Hair {
         let [sin_o, cos_o] = self.tilted(&lobes.wo, p);
         let cos = self.along(p).sample_cos(f64::from(u));
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
-        let sin_i = (-cos * sin_o + sin * (TAU * f64::from(v)).cos() * cos_o).clamp(-1.0, 1.0);
+        let sin_i = (-cos * sin_o + sin * unit_circle(v).x * cos_o).clamp(-1.0, 1.0);
         let cos_i = (1.0 - sin_i * sin_i).sqrt();
 
         // Around it.
@@ -167,16 +167,18 @@ impl Hair {
     }
 
     fn lobes(&self, wo: Vec3) -> Lobes {
+        let (y, z) = (f64::from(wo.y), f64::from(wo.z));
         let wo = HairDirection::new(wo);
-        let (h, cos_gamma) = wo.phi.sin_cos();
+        let across = (y * y + z * z).sqrt();
+        let (h, cos_gamma) = if across > 0.0 { (y / across, z / across) } else { (0.0, 1.0) };
         let eta = f64::from(self.eta);
 
         // The refracted ray, along the hair and across it.
         let sin_t = wo.sin / eta;
         let cos_t = (1.0 - sin_t * sin_t).sqrt();
-        let sin_gamma_t = h * wo.cos / ((eta - wo.sin) * (eta + wo.sin)).sqrt();
-        let gamma_t = sin_gamma_t.clamp(-1.0, 1.0).asin();
-        let path = (2.0 * gamma_t.cos() / cos_t) as f32;
+        let sin_gamma_t = (h * wo.cos / ((eta - wo.sin) * (eta + wo.sin)).sqrt()).clamp(-1.0, 1.0);
+        let gamma_t = sin_gamma_t.asin();
+        let path = (2.0 * ((1.0 - sin_gamma_t) * (1.0 + sin_gamma_t)).sqrt() / cos_t) as f32;
         let transmittance = self.sigma_a.map(|sigma| (-sigma * path).exp());
 
         let reflectance = fresnel::dielectric((wo.cos * cos_gamma).clamp(0.0, 1.0) as f32, self.eta).reflectance;
@@ -274,24 +276,15 @@ impl Longitudinal {
 /// `exp(-x) I0(x)` of an `x` not below 0, with the modified Bessel function `I0`, within 1e-6 of the value (Abramowitz
 /// and Stegun, 9.8.1 and 9.8.2).
 fn bessel_without_exponential(x: f64) -> f64 {
-    let polynomial = |t: f64, coefficients: &[f64]| coefficients.iter().rev().fold(0.0, |sum, c| sum * t + c);
     let t = x / 3.75;
     if t < 1.0 {
-        let series = [1.0, 3.515_622_9, 3.089_942_4, 1.206_749_2, 0.265_973_2, 0.036_076_8, 0.004_581_3];
-        return polynomial(t * t, &series) * (-x).exp();
+        let t = t * t;
+        let high = 0.265_973_2 + t * (0.036_076_8 + t * 0.004_581_3);
+        return (1.0 + t * (3.515_622_9 + t * (3.089_942_4 + t * (1.206_749_2 + t * high)))) * (-x).exp();
     }
-    let expansion = [
-        0.398_942_28,
-        0.013_285_92,
-        0.002_253_19,
-        -0.001_575_65,
-        0.009_162_81,
-        -0.020_577_06,
-        0.026_355_37,
-        -0.016_476_33,
-        0.003_923_77,
-    ];
-    polynomial(1.0 / t, &expansion) / x.sqrt()
+    let t = 1.0 / t;
+    let high = 0.009_162_81 + t * (-0.020_577_06 + t * (0.026_355_37 + t * (-0.016_476_33 + t * 0.003_923_77)));
+    (0.398_942_28 + t * (0.013_285_92 + t * (0.002_253_19 + t * (-0.001_575_65 + t * high)))) / x.sqrt()
 }
 
 /// The logistic distribution, cut off at half a turn to both sides and normalised there.
