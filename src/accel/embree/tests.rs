@@ -53,7 +53,7 @@ fn curves_of_embree_are_those_of_all_accelerators() {
                     _ => false,
                 };
                 different += usize::from(!is_same || embree.occluded(ray) != expected.is_some());
-                points[0].clone()
+                points[0]
             };
             for _ in 0..3_000 {
                 let (target, origin) = (rng.cube(), rng.cube().normalize() * rng.range(2.0, 20.0));
