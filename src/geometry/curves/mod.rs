@@ -173,7 +173,7 @@ impl Curves {
         self.points.iter().fold(0.0, |most, point| most.max(point[3]))
     }
 
-    /// Whether disks across the curves sweep the same surface as spheres along them, but for 0.5 % of the radius: tubes
+    /// Whether disks across the curves sweep the same surface as spheres along them, but for 1.2 % of the radius: tubes
     /// without corners that taper slowly. One segment in a hundred may do otherwise, such as one that turns back.
     pub fn is_swept_disk(&self) -> bool {
         const MOST_OTHERS: usize = 100;

@@ -39,7 +39,7 @@ const MAX_STEPS: u32 = 48;
 const FLAT_START: f64 = 2.0;
 
 /// The largest change of the radius by length with which a curve is slender.
-const MAX_SLOPE: f64 = 0.1;
+const MAX_SLOPE: f64 = 0.15;
 
 /// Its square is far from the limits of `f32`.
 const MIN_SIZE: f64 = 1e-9;
@@ -125,8 +125,8 @@ impl Segment {
         0.75 * second(a, b, c).max(second(b, c, d)).sqrt()
     }
 
-    /// Whether the curve runs along its chord all the way, and the radius, above 0, changes by less than a tenth of the
-    /// length: an envelope of spheres is then a tube of disks, as far as second orders (0.5 %) do not count.
+    /// Whether the curve runs along its chord all the way, and the radius, above 0, changes by less than 0.15 of the
+    /// length: an envelope of spheres is then a tube of disks, as far as second orders (1.2 %) do not count.
     pub fn is_slender(&self) -> bool {
         let [a, b, c, d] = self.0;
         let chord = (d - a).truncate();
