@@ -116,7 +116,7 @@ fn reports_compare_variants_and_programs_in_one_run() {
 fn interpreter(folder: &Folder, picture: &str) -> String {
     let program = format!(
         "#!/bin/sh\nif [ \"$1\" = -c ]; then case \"$2\" in *pyluxcore*) exit 1 ;; *) exit 0 ;; esac; fi\n\
-         grep -q 'scene.cycles.samples = arguments.spp' || exit 9\n\
+         grep -q 'scene.cycles.device' || exit 9\n\
          while [ $# -gt 1 ]; do [ \"$1\" = --out ] && out=$2; shift; done\n\
          cp '{picture}' \"$out\"; echo '{{\"render_seconds\": 0.5, \"processor_seconds\": 0.75}}'\n"
     );
