@@ -198,11 +198,11 @@ mod tests {
             spp: Some(spp),
         };
         assert_eq!(
-            PrintedStatistics::in_text("{\n \"render_seconds\": 1.5,\n \"processor_seconds\": 3, \"spp\": 16\n}\n"),
+            PrintedStatistics::in_text("{\"render_seconds\": 1.5,\n\"processor_seconds\": 3, \"spp\": 16}\n"),
             printed(1.5, 16)
         );
-        let line = "noise\n{\"load_s\": 1, \"runs\": [{\"render_s\": [9]}, {\"render_s\": [0.25, 0.3], \"cpu_s\": [0.5], \
-                    \"eff_spp\": 16.4}]}\n";
+        let line = "noise\n{\"load_s\": 1, \"runs\": [{\"render_s\": [9]}, {\"render_s\": [0.25, 0.3], \
+                    \"cpu_s\": [0.5], \"eff_spp\": 16.4}]}\n";
         assert_eq!(PrintedStatistics::in_text(line), printed(0.25, 16));
         assert_eq!(PrintedStatistics::in_text("{}\n{ broken"), PrintedStatistics::default());
         assert_eq!(PrintedStatistics::in_text("Rendering 4 s"), PrintedStatistics::default());

@@ -93,7 +93,7 @@ impl ErrorReport {
             let (name, first) = (&variant.name, &first.name);
             parts.push(if ratio[1] < 1.0 && ratio[2] > 1.0 {
                 format!(
-                    "{name}: {} as fast as {first} to equal error by processor time, so no difference beyond the spread",
+                    "{name}: {} as fast as {first} to equal error by processor time: no difference beyond spread",
                     times(ratio)
                 )
             } else {
@@ -192,8 +192,8 @@ impl ErrorReport {
         let equal = self.equal_error.as_ref();
         let mut table = Table::new(
             "Least squares of the logarithms; -1: independent samples",
-            "variant | slope of relMSE over time | slope over spp | s to equal relMSE | against the first | processor s \
-             | against the first by processor s",
+            "variant | slope of relMSE over time | slope over spp | s to equal relMSE | against the first | processor \
+             s | against the first by processor s",
         );
         if let Some(equal) = equal {
             table.heads[3] = format!("s to relMSE {}", number(equal.relmse));

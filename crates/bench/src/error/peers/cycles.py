@@ -1,4 +1,6 @@
-"""Renders a scene of Blender (.blend) or glTF with Cycles on the CPU: the same number of samples for every pixel, no denoising."""
+"""Renders a scene of Blender (.blend) or glTF with Cycles on the CPU.
+
+Every pixel has the same number of samples; nothing is denoised."""
 
 import argparse
 import json
@@ -65,7 +67,8 @@ def spent(samples):
     return [time.monotonic() - start, processor_seconds() - before]
 
 
-# A first render loads what Cycles needs. The second and the third differ by the samples: what comes before is taken out.
+# A first render loads what Cycles needs. The second and the third differ by samples alone, which takes out what comes
+# before.
 spent(1)
 first = spent(1)
 all_samples = spent(arguments.spp)

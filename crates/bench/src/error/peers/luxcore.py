@@ -1,4 +1,6 @@
-"""Renders a scene of LuxCore (.cfg, with the .scn that it names) with the engine PATHCPU, unless the file names another of the CPU."""
+"""Renders a scene of LuxCore (.cfg, with the .scn that it names).
+
+The engine is PATHCPU, unless the file names another of the CPU."""
 
 import argparse
 import json
