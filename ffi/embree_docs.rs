@@ -445,6 +445,21 @@ impl Default for StUserPrimitives {
 }
 #[repr(C)]
 #[derive(Debug, Copy, Clone)]
+pub struct StCurves {
+    pub primitives: StUserPrimitives,
+    pub reach: f32,
+}
+impl Default for StCurves {
+    fn default() -> Self {
+        let mut s = ::std::mem::MaybeUninit::<Self>::uninit();
+        unsafe {
+            ::std::ptr::write_bytes(s.as_mut_ptr(), 0, 1);
+            s.assume_init()
+        }
+    }
+}
+#[repr(C)]
+#[derive(Debug, Copy, Clone)]
 pub struct StFilter {
     pub user: *const ::std::os::raw::c_void,
     pub counts: StCounts,
@@ -520,6 +535,7 @@ unsafe extern "C" {
     pub fn st_new_entered_instance(device: RTCDevice, instance: *const StEnteredInstance) -> RTCGeometry;
     pub fn st_new_user_geometry(device: RTCDevice, shape: *const StUserShape) -> RTCGeometry;
     pub fn st_new_user_primitives(device: RTCDevice, primitives: *const StUserPrimitives) -> RTCGeometry;
+    pub fn st_set_curve_filter(geometry: RTCGeometry, curves: *const StCurves);
     pub fn st_set_filter(triangles: RTCGeometry, filter_data: *const StFilter);
     pub fn st_intersect1(scene: RTCScene, query: *mut StQuery, rayhit: *mut RTCRayHit);
     pub fn st_occluded1(scene: RTCScene, query: *mut StQuery, ray: *mut RTCRay);

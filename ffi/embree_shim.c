@@ -188,6 +188,37 @@ void st_set_filter(RTCGeometry triangles, const struct StFilter *filter_data) {
     rtcSetGeometryOccludedFilterFunction(triangles, filter);
 }
 
+/* Distances of Embree may be this part of the reach too small. */
+static const float CURVE_SLACK = 0.25f;
+
+static bool curve_counts(const struct StCurves *curves, const struct RTCFilterFunctionNArguments *args, unsigned lane) {
+    const unsigned n = args->N;
+    const float *rays = (const float *)args->ray, *reals = (const float *)args->hit;
+    struct StRay ray = ray_of_lane(rays, n, lane);
+    const float *d = ray.direction;
+    const float facing = reals[NG_X * n + lane] * d[0] + reals[NG_Y * n + lane] * d[1] + reals[NG_Z * n + lane] * d[2];
+    /* False for a NaN. */
+    if (!(facing < 0.0f)) return false;
+    const float length = sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    if (ray.t_max * length > curves->reach) return true;
+    const unsigned *ids = (const unsigned *)reals;
+    ray.t_max += CURVE_SLACK * curves->reach / length;
+    const struct StUserPrimitives *primitives = &curves->primitives;
+    return primitives->intersect(primitives->shape, ids[PRIM_ID * n + lane], &ray, key_of_lane(rays, n, lane), ids[INST_ID * n + lane]) >= 0.0f;
+}
+
+static void curve_filter(const struct RTCFilterFunctionNArguments *args) {
+    for (unsigned lane = 0; lane < args->N; lane++) {
+        if (args->valid[lane] == -1 && !curve_counts(args->geometryUserPtr, args, lane)) args->valid[lane] = 0;
+    }
+}
+
+void st_set_curve_filter(RTCGeometry geometry, const struct StCurves *curves) {
+    rtcSetGeometryUserData(geometry, (void *)curves);
+    rtcSetGeometryIntersectFilterFunction(geometry, curve_filter);
+    rtcSetGeometryOccludedFilterFunction(geometry, curve_filter);
+}
+
 typedef float Float4 __attribute__((vector_size(16), may_alias));
 
 /* Written in pieces of 16 bytes, which Embree reads at once; smaller ones could not be forwarded from the store buffer. */

@@ -89,6 +89,18 @@ struct StUserPrimitives {
 /* A new, committed geometry of user primitives; null on an error. */
 RTCGeometry st_new_user_primitives(RTCDevice device, const struct StUserPrimitives *primitives);
 
+/*
+ * The user data of curves that Embree intersects itself. Their `primitives` decide on hits closer than `reach` to the origin of a ray, among which
+ * are those of the curve that the ray leaves. It must outlive the geometry.
+ */
+struct StCurves {
+    struct StUserPrimitives primitives;
+    float reach;
+};
+
+/* Lets hits with curves count only from outside and where `curves` says so. To be called before the geometry is committed. */
+void st_set_curve_filter(RTCGeometry geometry, const struct StCurves *curves);
+
 /* The user data of triangles with holes or slivers. It must outlive the geometry. */
 struct StFilter {
     const void *user;

@@ -141,12 +141,10 @@ pub enum TexturedMaterial {
     Hair {
         /// What it absorbs.
         color: HairColor,
-        /// Index of refraction over that of the outside.
-        ior: f32,
-        /// Roughness along and around it.
-        roughness: [f32; 2],
-        /// The tilt of its scales in radians.
-        tilt: f32,
+        /// Without absorption.
+        hair: Hair,
+        /// Its roughness around it.
+        azimuthal: f32,
     },
 }
 
@@ -265,8 +263,8 @@ impl TexturedMaterial {
                 Bsdf::coated(coat.at(textures, footprint), tint.at(textures, footprint), base)
             }
             Self::Principled(inputs) => Bsdf::Principled(Principled::new(&inputs.parameters(textures, footprint))),
-            Self::Hair { color, ior, roughness, tilt } => {
-                Bsdf::Hair(Hair::new(color.absorption(roughness[1], textures, footprint), *ior, *roughness, *tilt))
+            Self::Hair { color, hair, azimuthal } => {
+                Bsdf::Hair(hair.with_absorption(color.absorption(*azimuthal, textures, footprint)))
             }
         }
     }

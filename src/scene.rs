@@ -1,7 +1,8 @@
-//! A scene ready to render: tables and ids, no paths, and no names but those of layers: light groups, objects,
-//! materials.
+//! A scene ready to render: tables and ids, no paths, and no names but those of layers (light groups, objects,
+//! materials) and of materials that may be replaced.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use crate::bsdf::Bsdf;
@@ -86,6 +87,17 @@ pub struct SceneFeatures {
     pub motion: bool,
 }
 
+impl SceneFeatures {
+    /// Sets what depends on materials and textures alone.
+    pub fn set_materials(&mut self, materials: &[Material], textures: &[Texture]) {
+        self.textures = materials.iter().any(Material::is_textured);
+        self.filtered_textures = self.textures && textures.iter().any(Texture::is_filtered);
+        self.anisotropic = materials.iter().any(|material| material.flags().is_anisotropic());
+        self.parameters = self.anisotropic || !textures.is_empty();
+        self.delta_materials = materials.iter().any(|material| material.flags().is_delta());
+    }
+}
+
 /// A scene ready to render.
 #[derive(Clone, Debug)]
 pub struct Scene {
@@ -95,6 +107,8 @@ pub struct Scene {
     pub surfaces: Vec<Surface>,
     /// Materials, by [`MaterialId`].
     pub materials: Vec<Material>,
+    /// Materials that another one of constants may replace without another change, by name.
+    pub plain_materials: HashMap<String, MaterialId>,
     /// Normal maps and bump maps, by [`NormalPerturbationId`].
     pub normal_perturbations: Vec<NormalPerturbation>,
     /// What surfaces have within them, by [`MediumId`].

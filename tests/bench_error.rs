@@ -1,3 +1,4 @@
+use std::os::unix::fs::PermissionsExt;
 use std::process::{Command, Output};
 
 use serde_json::{Value, json};
@@ -109,6 +110,48 @@ fn reports_compare_variants_and_programs_in_one_run() {
     let pictures: Value = serde_json::from_str(pictures).unwrap();
     assert_eq!((&pictures["size"], pictures["tests"].as_array().unwrap().len()), (&json!([24, 16]), 6));
     assert_eq!(pictures["tests"][5]["name"], "self, 16 spp");
+}
+
+/// A Python interpreter that has every module but LuxCore's, and renders by copying a picture.
+fn interpreter(folder: &Folder, picture: &str) -> String {
+    let program = format!(
+        "#!/bin/sh\nif [ \"$1\" = -c ]; then case \"$2\" in *pyluxcore*) exit 1 ;; *) exit 0 ;; esac; fi\n\
+         grep -q 'scene.cycles.device' || exit 9\n\
+         while [ $# -gt 1 ]; do [ \"$1\" = --out ] && out=$2; shift; done\n\
+         cp '{picture}' \"$out\"; echo '{{\"render_seconds\": 0.5, \"processor_seconds\": 0.75}}'\n"
+    );
+    let file = folder.write("python", program);
+    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o755)).unwrap();
+    file.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn other_renderers_run_by_their_python_modules() {
+    let folder = Folder::new();
+    let scene = scene(&folder);
+    let reference = reference(&folder, &scene);
+    let python = interpreter(&folder, &reference);
+    let named = |peer: &str, file: &str| format!("{peer}={}", folder.write(file, "").to_str().unwrap());
+    let (cycles, luxcore) = (named("cycles", "floor.glb"), named("luxcore", "floor.cfg"));
+    let arguments = ["--reference", &reference, "--spp", "4", "--repeat", "1", "--python", &python, "--json", "-q"];
+    let run = bench(&[&[scene.as_str(), "--peers", "--peer", &cycles], &arguments[..]].concat());
+    assert!(run.status.success(), "{run:?}");
+    let report: Value = serde_json::from_slice(&run.stdout).unwrap();
+    let names: Vec<_> = report["variants"].as_array().unwrap().iter().map(|v| v["name"].as_str().unwrap()).collect();
+    // --peers adds none: Mitsuba and LuxCore do not read this scene.
+    assert_eq!(names, ["steradian", "cycles"]);
+    let run = &report["variants"][1]["points"][0]["runs"][0];
+    assert_eq!((&run["seconds"], &run["processor_seconds"], &run["relmse"]), (&json!(0.5), &json!(0.75), &json!(0.0)));
+    for (peer, message) in [
+        (luxcore.as_str(), "has no module pyluxcore"),
+        ("cycles", "is not a scene that it reads (.blend, .gltf, .glb)"),
+        ("cycles=missing.glb", "missing.glb: file not found"),
+        ("blender", "expected mitsuba, cycles or luxcore"),
+    ] {
+        let run = bench(&[&[scene.as_str(), "--peer", peer], &arguments[..]].concat());
+        let text = String::from_utf8_lossy(&run.stderr);
+        assert!(run.status.code() == Some(2) && text.contains(message), "{peer}: {text}");
+    }
 }
 
 #[test]

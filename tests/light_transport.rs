@@ -1,43 +1,8 @@
-//! Integrators against furnaces and the depth law, and the three strategies against each other; more is in the
-//! catalogue of stability, group I.
+//! The three strategies against each other; furnaces and the depth law are in the catalogue of stability, group I.
 
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::util::render::{AssertIs, Estimate, assert_blocks_agree, block_means, floor_probe, merge, render};
-
-/// Inside a closed sphere of albedo 1/2 that emits 1/2: radiance 1/2 + 1/4 + 1/8 + ... = 1.
-fn furnace(max_depth: u32, rr_depth: u32) -> Value {
-    json!({
-        "film": { "width": 16, "height": 16, "filter": { "type": "box" } },
-        "camera": { "position": [0.1, 0.2, 0.3], "look_at": [0.4, 0.1, -0.5], "vertical_fov_degrees": 60.0 },
-        "sampler": { "type": "independent", "spp": 256 },
-        "integrator": { "type": "path", "max_depth": max_depth, "rr_depth": rr_depth },
-        "materials": { "grey": { "type": "diffuse", "albedo": 0.5 } },
-        "shapes": [{
-            "type": "sphere", "material": "grey", "emission": { "radiance": [0.5, 0.5, 0.5], "two_sided": true }
-        }]
-    })
-}
-
-#[test]
-fn a_furnace_of_albedo_one_half_shines_with_radiance_one() {
-    for strategy in ["mis", "light", "bsdf"] {
-        for rr_depth in [1, 5, 100] {
-            let mut scene = furnace(64, rr_depth);
-            scene["integrator"]["strategy"] = json!(strategy);
-            Estimate::of(&render(&scene), 1).assert_is(1.0, &format!("{strategy}, roulette from {rr_depth}"));
-        }
-    }
-}
-
-#[test]
-fn each_bounce_adds_half_of_the_one_before() {
-    for (depth, expected) in [(1, 0.5), (2, 0.75), (3, 0.875), (4, 0.9375), (5, 0.96875)] {
-        for rr_depth in [1, 100] {
-            Estimate::of(&render(&furnace(depth, rr_depth)), 1).assert_is(expected, &format!("depth {depth}"));
-        }
-    }
-}
 
 #[test]
 fn the_strategies_agree_on_three_scenes() {

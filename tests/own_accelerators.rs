@@ -1,16 +1,16 @@
 //! Our own accelerators against the linear oracle: the same answers bit for bit, on anything, with bounded work.
 
-use steradian::internal::accel::inspect::{StructureStats, TraversalCounts};
+use steradian::internal::accel::inspect::StructureStats;
 use steradian::internal::accel::{AccelKind, Accelerator, LinearAccel, build};
 use steradian::internal::geometry::{Geometry, Hit, Mesh};
 use steradian::internal::math::{DVec3, Ray};
 use steradian::internal::render::{Overrides, Settings};
 use steradian::internal::{compile, import};
-use steradian_bench::{bumpy_sphere, record};
+use steradian_bench::record;
 
-use crate::util::geometry::{Rng, grid, mesh, meshes, ray, ray_through};
+use crate::util::geometry::{Rng, mesh, meshes, ray, ray_through};
 use crate::util::root;
-use crate::util::scenes::{own, path_rays, same};
+use crate::util::scenes::{own, same};
 
 fn assert_equal(name: &str, geometry: &Geometry, accels: &[(&str, Box<dyn Accelerator + '_>)], rays: &[Ray]) {
     let oracle = LinearAccel::new(geometry);
@@ -70,47 +70,6 @@ fn rays_of_renders_get_the_same_answers() {
 #[ignore = "takes minutes"]
 fn many_rays_of_renders_get_the_same_answers() {
     agree_on_renders(100_000);
-}
-
-/// Nodes and primitives per ray, each kind on the mean.
-fn visits(geometry: &Geometry, rays: &[Ray], most: &[(&str, f64)]) {
-    for (name, accel) in own(geometry) {
-        let Some((_, bound)) = most.iter().find(|(n, _)| *n == name) else { continue };
-        let inspect = accel.inspect().unwrap();
-        let mut counts = TraversalCounts::default();
-        for ray in rays {
-            assert_eq!(inspect.intersect_counted(ray, &mut counts), accel.intersect(ray), "{name}");
-        }
-        let [nodes, prims] = [counts.nodes, counts.prims].map(|count| count as f64 / rays.len() as f64);
-        let mean = nodes + prims;
-        println!("{name}: {nodes:.1} nodes and {prims:.1} primitives per ray");
-        assert!(mean <= *bound, "{name}: {mean}");
-    }
-}
-
-/// A mesh alone, and small on a large floor, which trees that halve space or require every half to be smaller do not
-/// get through.
-#[test]
-fn a_ray_visits_few_nodes_and_primitives() {
-    let floor = || grid(DVec3::new(-20.0, -20.0, -1.5), 40.0 * DVec3::X, 40.0 * DVec3::Y, 1, |_, _| 0.0);
-    for (name, shapes) in [("alone", vec![bumpy_sphere(70_000)]), ("on a floor", vec![bumpy_sphere(70_000), floor()])] {
-        // Rays at the mesh, not at the floor.
-        let alone = meshes(vec![bumpy_sphere(70_000)]);
-        let [camera, bounce, _] = path_rays(&alone, &mut Rng::new(37), 4_000);
-        let geometry = meshes(shapes);
-        println!("{name}, camera");
-        visits(
-            &geometry,
-            &camera,
-            &[("bvh", 15.0), ("bvh:binary", 64.0), ("kdtree", 64.0), ("kdtree:median", 160.0), ("octree", 64.0)],
-        );
-        println!("{name}, bounce");
-        visits(
-            &geometry,
-            &bounce,
-            &[("bvh", 40.0), ("bvh:binary", 128.0), ("kdtree", 128.0), ("kdtree:median", 320.0), ("octree", 96.0)],
-        );
-    }
 }
 
 #[test]

@@ -13,7 +13,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::{BsdfEval, BsdfFlags, BsdfSample, fresnel};
 use crate::color::Rgb;
-use crate::math::{Vec3, vec3};
+use crate::math::{Vec3, unit_circle, vec3};
 
 /// Lobes, the last for all higher orders.
 const LOBES: usize = 4;
@@ -42,10 +42,9 @@ pub fn hair_absorption_of_color(color: Rgb, azimuthal: f32) -> Rgb {
 pub struct Hair {
     sigma_a: Rgb,
     eta: f32,
-    /// Variance along the hair of the lobes; that of the last is that of the third.
-    variance: [f32; 3],
-    /// Scale of the logistic distribution around the hair.
-    scale: f32,
+    /// Along the hair, of the lobes; that of the last is that of the third.
+    along: [Longitudinal; 3],
+    around: Logistic,
     /// Sine and cosine of once, twice, and four times the tilt of the scales.
     tilt: [[f32; 2]; 3],
 }
@@ -61,10 +60,10 @@ struct HairDirection {
 
 impl HairDirection {
     fn new(v: Vec3) -> Self {
-        let [x, y, z] = v.to_array().map(f64::from);
-        let across = y.hypot(z);
+        let (x, y, z) = (f64::from(v.x), f64::from(v.y), f64::from(v.z));
         // A direction is unit within rounding only.
-        let length = x.hypot(across);
+        let across = (y * y + z * z).sqrt();
+        let length = (x * x + across * across).sqrt();
         Self { sin: x / length, cos: across / length, phi: if across > 0.0 { y.atan2(z) } else { 0.0 } }
     }
 }
@@ -92,10 +91,15 @@ impl Hair {
         Self {
             sigma_a,
             eta: ior,
-            variance: [reflected, 0.25 * reflected, 4.0 * reflected],
-            scale,
+            along: [1.0, 0.25, 4.0].map(|factor| Longitudinal::new(factor * reflected)),
+            around: Logistic::new(scale),
             tilt: [1.0, 2.0, 4.0].map(sin_cos),
         }
+    }
+
+    /// This hair with another absorption per radius.
+    pub fn with_absorption(self, sigma_a: Rgb) -> Self {
+        Self { sigma_a, ..self }
     }
 
     /// Value and density for a pair of directions.
@@ -110,8 +114,7 @@ impl Hair {
         let (mut value, mut pdf) = (Rgb::BLACK, 0.0);
         for p in 0..LOBES {
             let [sin, cos] = self.tilted(&lobes.wo, p);
-            let along = longitudinal([wi.sin, wi.cos], [sin, cos], self.variance(p));
-            let density = along * self.azimuthal(lobes, p, phi);
+            let density = self.along(p).density([wi.sin, wi.cos], [sin, cos]) * self.azimuthal(lobes, p, phi);
             value += lobes.attenuation[p] * density as f32;
             pdf += lobes.pmf[p] * density;
         }
@@ -124,21 +127,17 @@ impl Hair {
         let lobes = self.lobes(vec3(wo.x, wo.y, wo.z * side));
         let (p, w) = choose(&lobes.pmf, f64::from(u_lobe));
 
-        // Along the hair (d'Eon, Marschner and Hanika, "Importance Sampling for Physically-Based Hair Fiber Models").
         let [sin_o, cos_o] = self.tilted(&lobes.wo, p);
-        let variance = self.variance(p);
-        let u = f64::from(u);
-        let cos = 1.0 + variance * (u.max(1e-30) + (1.0 - u) * (-2.0 / variance).exp()).ln();
+        let cos = self.along(p).sample_cos(f64::from(u));
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
-        let sin_i = (-cos * sin_o + sin * (TAU * f64::from(v)).cos() * cos_o).clamp(-1.0, 1.0);
+        let sin_i = (-cos * sin_o + sin * unit_circle(v).x * cos_o).clamp(-1.0, 1.0);
         let cos_i = (1.0 - sin_i * sin_i).sqrt();
 
         // Around it.
-        let turn =
-            if p + 1 < LOBES { exit_angle(&lobes, p) + sample_logistic(w, f64::from(self.scale)) } else { TAU * w };
+        let turn = if p + 1 < LOBES { exit_angle(&lobes, p) + self.around.sample(w) } else { TAU * w };
         let phi = lobes.wo.phi + turn;
         let wi = vec3(sin_i as f32, (cos_i * phi.sin()) as f32, (cos_i * phi.cos()) as f32);
-        let BsdfEval { value, pdf } = self.eval_lobes(&lobes, HairDirection::new(wi));
+        let BsdfEval { value, pdf } = self.eval_lobes(&lobes, HairDirection { sin: sin_i, cos: cos_i, phi });
         let wi = vec3(wi.x, wi.y, wi.z * side);
         // False for a NaN.
         (pdf > 0.0 && pdf.is_finite()).then(|| BsdfSample {
@@ -163,21 +162,23 @@ impl Hair {
         lobes.attenuation.iter().fold(Rgb::BLACK, |sum, &a| sum + a)
     }
 
-    fn variance(&self, p: usize) -> f64 {
-        f64::from(self.variance[p.min(2)])
+    fn along(&self, p: usize) -> &Longitudinal {
+        &self.along[p.min(2)]
     }
 
     fn lobes(&self, wo: Vec3) -> Lobes {
+        let (y, z) = (f64::from(wo.y), f64::from(wo.z));
         let wo = HairDirection::new(wo);
-        let (h, cos_gamma) = wo.phi.sin_cos();
+        let across = (y * y + z * z).sqrt();
+        let (h, cos_gamma) = if across > 0.0 { (y / across, z / across) } else { (0.0, 1.0) };
         let eta = f64::from(self.eta);
 
         // The refracted ray, along the hair and across it.
         let sin_t = wo.sin / eta;
         let cos_t = (1.0 - sin_t * sin_t).sqrt();
-        let sin_gamma_t = h * wo.cos / ((eta - wo.sin) * (eta + wo.sin)).sqrt();
-        let gamma_t = sin_gamma_t.clamp(-1.0, 1.0).asin();
-        let path = (2.0 * gamma_t.cos() / cos_t) as f32;
+        let sin_gamma_t = (h * wo.cos / ((eta - wo.sin) * (eta + wo.sin)).sqrt()).clamp(-1.0, 1.0);
+        let gamma_t = sin_gamma_t.asin();
+        let path = (2.0 * ((1.0 - sin_gamma_t) * (1.0 + sin_gamma_t)).sqrt() / cos_t) as f32;
         let transmittance = self.sigma_a.map(|sigma| (-sigma * path).exp());
 
         let reflectance = fresnel::dielectric((wo.cos * cos_gamma).clamp(0.0, 1.0) as f32, self.eta).reflectance;
@@ -217,7 +218,7 @@ impl Hair {
             return 1.0 / TAU;
         }
         let off = phi - exit_angle(lobes, p);
-        logistic(off - TAU * (off / TAU).round(), f64::from(self.scale))
+        self.around.density(off - TAU * (off / TAU).round())
     }
 }
 
@@ -237,53 +238,93 @@ fn choose(pmf: &[f64; LOBES], u: f64) -> (usize, f64) {
     (p, ((u - below) / pmf[p].max(f64::MIN_POSITIVE)).clamp(0.0, 1.0 - f64::EPSILON))
 }
 
-/// d'Eon's distribution along the hair, from sine and cosine of both angles: `exp(-b) I0(a) / (2 v sinh(1 / v))` with
-/// `a = cos cos / v` and `b = sin sin / v`, in logarithms so that nothing overflows.
-fn longitudinal([sin_i, cos_i]: [f64; 2], [sin_o, cos_o]: [f64; 2], variance: f64) -> f64 {
-    let (a, b) = (cos_i * cos_o / variance, sin_i * sin_o / variance);
-    // ln (2 sinh x) = x + ln (1 - exp(-2 x)).
-    let log_sinh = 1.0 / variance + (-(-2.0 / variance).exp()).ln_1p();
-    (log_bessel(a) - b - log_sinh).exp() / variance
+/// d'Eon's distribution along the hair: `exp(-b) I0(a) / (2 v sinh(1 / v))` of the variance `v`, with
+/// `a = cos cos / v` and `b = sin sin / v`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Longitudinal {
+    /// `1 / v`.
+    concentration: f32,
+    /// `1 / (v (1 - exp(-2 / v)))`.
+    normalization: f32,
+    /// `exp(-2 / v)`.
+    least: f32,
 }
 
-/// The logarithm of the modified Bessel function `I0` of an `x` not below 0: by its series, for large ones by its
-/// asymptotic expansion (Abramowitz and Stegun, 9.6.10 and 9.7.1), each within 1e-9.
-fn log_bessel(x: f64) -> f64 {
-    if x < 20.0 {
-        let quarter = 0.25 * x * x;
-        let (mut term, mut sum) = (1.0, 1.0);
-        for i in 1..48 {
-            term *= quarter / f64::from(i * i);
-            sum += term;
-            if term < 1e-12 * sum {
-                break;
-            }
+impl Longitudinal {
+    fn new(variance: f32) -> Self {
+        let concentration = 1.0 / variance;
+        let of_all = -(-2.0 * f64::from(concentration)).exp_m1();
+        let normalization = (f64::from(concentration) / of_all) as f32;
+        Self { concentration, normalization, least: (1.0 - of_all) as f32 }
+    }
+
+    /// The density, from sine and cosine of both angles. Exponents are summed before anything can overflow:
+    /// `2 sinh(x) = exp(x) (1 - exp(-2 x))`.
+    fn density(&self, [sin_i, cos_i]: [f64; 2], [sin_o, cos_o]: [f64; 2]) -> f64 {
+        let (cos, concentration) = (cos_i * cos_o, f64::from(self.concentration));
+        let exponent = (cos - sin_i * sin_o - 1.0) * concentration;
+        bessel_without_exponential(cos * concentration) * exponent.exp() * f64::from(self.normalization)
+    }
+
+    /// The cosine to the cone (d'Eon, Marschner and Hanika, "Importance Sampling for Physically-Based Hair Fiber
+    /// Models").
+    fn sample_cos(&self, u: f64) -> f64 {
+        1.0 + (u.max(1e-30) + (1.0 - u) * f64::from(self.least)).ln() / f64::from(self.concentration)
+    }
+}
+
+/// `exp(-x) I0(x)` of an `x` not below 0, with the modified Bessel function `I0`, within 1e-6 of the value (Abramowitz
+/// and Stegun, 9.8.1 and 9.8.2).
+fn bessel_without_exponential(x: f64) -> f64 {
+    let t = x / 3.75;
+    if t < 1.0 {
+        let t = t * t;
+        let high = 0.265_973_2 + t * (0.036_076_8 + t * 0.004_581_3);
+        return (1.0 + t * (3.515_622_9 + t * (3.089_942_4 + t * (1.206_749_2 + t * high)))) * (-x).exp();
+    }
+    let t = 1.0 / t;
+    let high = 0.009_162_81 + t * (-0.020_577_06 + t * (0.026_355_37 + t * (-0.016_476_33 + t * 0.003_923_77)));
+    (0.398_942_28 + t * (0.013_285_92 + t * (0.002_253_19 + t * (-0.001_575_65 + t * high)))) / x.sqrt()
+}
+
+/// The logistic distribution, cut off at half a turn to both sides and normalised there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Logistic {
+    scale: f32,
+    /// The probability beyond half a turn to one side.
+    tail: f32,
+}
+
+impl Logistic {
+    fn new(scale: f32) -> Self {
+        Self { scale, tail: (1.0 / (1.0 + (PI / f64::from(scale)).exp())) as f32 }
+    }
+
+    fn density(&self, x: f64) -> f64 {
+        let (scale, inside) = (f64::from(self.scale), 1.0 - 2.0 * f64::from(self.tail));
+        let e = (-x.abs() / scale).exp();
+        e / (scale * (1.0 + e).powi(2) * inside)
+    }
+
+    fn sample(&self, u: f64) -> f64 {
+        let tail = f64::from(self.tail);
+        let cumulative = tail + u * (1.0 - 2.0 * tail);
+        (-f64::from(self.scale) * (1.0 / cumulative - 1.0).ln()).clamp(-PI, PI)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bessel_functions_are_their_integrals() {
+        for x in (0..400).map(|i| 0.025 * f64::from(i * i)) {
+            // (1 / pi) times the integral of exp(x (cos a - 1)) over half a turn; midpoints of a periodic function.
+            let values = (0..2_000).map(|i| (x * ((f64::from(i) + 0.5) * PI / 2_000.0).cos() - x).exp());
+            let expected = values.sum::<f64>() / 2_000.0;
+            let found = bessel_without_exponential(x);
+            assert!((found / expected - 1.0).abs() < 1e-6, "{x}: {found} {expected}");
         }
-        return sum.ln();
     }
-    let mut term = 1.0;
-    let mut sum = 1.0;
-    for k in 1..10 {
-        let k = f64::from(k);
-        term *= (2.0 * k - 1.0).powi(2) / (8.0 * k * x);
-        sum += term;
-    }
-    x - 0.5 * (TAU * x).ln() + sum.ln()
-}
-
-/// The logistic density, cut off at half a turn to both sides and normalised there.
-fn logistic(x: f64, scale: f64) -> f64 {
-    let e = (-x.abs() / scale).exp();
-    e / (scale * (1.0 + e).powi(2)) / (1.0 - 2.0 * tail(scale))
-}
-
-/// The probability of the logistic distribution beyond half a turn to one side.
-fn tail(scale: f64) -> f64 {
-    1.0 / (1.0 + (PI / scale).exp())
-}
-
-fn sample_logistic(u: f64, scale: f64) -> f64 {
-    let outside = tail(scale);
-    let cumulative = outside + u * (1.0 - 2.0 * outside);
-    (-scale * (1.0 / cumulative - 1.0).ln()).clamp(-PI, PI)
 }

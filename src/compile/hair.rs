@@ -1,7 +1,7 @@
 //! Hair: its parameters checked.
 
 use super::materials::Compiler;
-use crate::bsdf::hair_absorption;
+use crate::bsdf::{Hair, hair_absorption};
 use crate::color::Rgb;
 use crate::desc::HairDesc;
 use crate::error::Result;
@@ -44,6 +44,6 @@ impl Compiler<'_> {
                 return Err(self.files.error(path, message));
             }
         };
-        Ok(TexturedMaterial::Hair { color, ior, roughness, tilt })
+        Ok(TexturedMaterial::Hair { color, hair: Hair::new(Rgb::BLACK, ior, roughness, tilt), azimuthal: roughness[1] })
     }
 }

@@ -6,7 +6,9 @@ use super::CompileContext;
 use super::faults::Faults;
 use super::media::NamedMedia;
 use super::textures::{TextureTable, TextureUse};
-use crate::bsdf::{Beckmann, Coat, Conductor, Ggx, Lambert, SeparableGgx, diffuse_mean, mitsuba_diffuse_mean};
+use crate::bsdf::{
+    Beckmann, BsdfFlags, Coat, Conductor, Ggx, Lambert, SeparableGgx, diffuse_mean, mitsuba_diffuse_mean,
+};
 use crate::color::Rgb;
 use crate::desc::{
     ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, PlasticDesc, RangedDesc, RoughnessDesc,
@@ -25,6 +27,7 @@ use crate::suggestion::did_you_mean;
 use crate::texture::Texture;
 
 /// All materials and textures, with their names.
+#[derive(Default)]
 pub struct MaterialTable {
     pub materials: Vec<Material>,
     pub textures: TextureTable,
@@ -64,16 +67,7 @@ impl MaterialTable {
     pub fn new(files: &CompileContext, desc: &SceneDesc, used: &UsedNames, faults: &mut Faults) -> Result<Self> {
         let textures = TextureTable::new(files, desc, used)?;
         let default = Material::from(Lambert { albedo: Rgb::splat(0.5) });
-        let mut table = Self {
-            materials: vec![default],
-            textures: TextureTable::default(),
-            normal_perturbations: Vec::new(),
-            media: Media::default(),
-            by_material: HashMap::new(),
-            names: HashMap::new(),
-            medium_of: HashMap::new(),
-            subsurface_of: HashMap::new(),
-        };
+        let mut table = Self { materials: vec![default], ..Self::default() };
         let media = NamedMedia::new(files, desc, used)?;
         let compiler = Compiler { files, textures: &textures, media: &media };
         for name in desc.materials.keys() {
@@ -174,6 +168,22 @@ impl MaterialTable {
         };
         let count = if self.subsurface_of.is_empty() { 0 } else { self.materials.len() };
         (0..count).map(|i| placed(MaterialId::new(i))).collect()
+    }
+
+    /// Whether a material is made of constants alone, has nothing within or below its surface, and is for any shape.
+    pub(super) fn is_plain(&self, id: MaterialId) -> bool {
+        let is_constant =
+            matches!(&self.materials[id.index()], Material::Constant(bsdf) if !bsdf.flags().contains(BsdfFlags::FIBER));
+        is_constant
+            && !self.medium_of.contains_key(&id)
+            && !self.has_subsurface(id)
+            && self.normal_perturbation_of(id).is_none()
+    }
+
+    /// The [plain](Self::is_plain) materials that have names.
+    pub(super) fn plain(&self) -> HashMap<String, MaterialId> {
+        let named = self.names.iter().map(|(name, binding)| (name.clone(), binding.material));
+        named.filter(|&(_, id)| self.is_plain(id)).collect()
     }
 
     /// The material of a name, or the default.

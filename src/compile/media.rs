@@ -64,6 +64,7 @@ impl Compiler<'_> {
 }
 
 /// Media of the scene by name, of priority 0 and index 1.
+#[derive(Default)]
 pub(super) struct NamedMedia<'a> {
     media: BTreeMap<&'a str, Medium>,
     /// What differs within them, by [`VolumeId`].

@@ -36,7 +36,7 @@ mod textures;
 mod transforms;
 mod volumes;
 
-pub use changes::change_camera;
+pub use changes::SceneChanges;
 pub use file_cache::FileCache;
 pub use settings::{CheckedScene, check_film_and_integrator};
 pub use summary::Summary;
@@ -52,7 +52,6 @@ use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Shape};
 use crate::id::TextureId;
 use crate::light::LightSet;
-use crate::material::Material;
 use crate::math::{Bounds, RenderSpace};
 use crate::medium::{Medium, Subsurface};
 use crate::scene::{Scene, SceneFeatures, Surface};
@@ -264,36 +263,33 @@ impl Builder {
         check_light(files, &desc.integrator, lights.shines(), &in_use)?;
         let part_normal_perturbations = self.materials.part_normal_perturbations();
         let subsurface = self.materials.subsurface(&self.space);
+        let plain_materials = self.materials.plain();
         let materials = self.materials.materials;
         let normal_perturbations = !part_normal_perturbations.is_empty()
             || self.surfaces.iter().any(|surface| surface.normal_perturbation.is_some());
-        let anisotropic = materials.iter().any(|material| material.flags().is_anisotropic());
-        let features = SceneFeatures {
+        let mut features = SceneFeatures {
             lights: !lights.is_empty(),
             hidden_emitters: self.surfaces.iter().any(|surface| surface.hidden),
             environment: sky,
             analytic_shapes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Analytic(_))),
             instances: !self.geometry.instances.is_empty(),
-            textures: materials.iter().any(Material::is_textured),
             attributes: self.geometry.shapes.iter().any(Shape::has_attributes),
-            filtered_textures: materials.iter().any(Material::is_textured)
-                && self.materials.textures.textures.iter().any(Texture::is_filtered),
             image_textures: self.materials.textures.textures.iter().any(Texture::has_image),
             normal_perturbations,
             shading_normals: normal_perturbations || self.geometry.shapes.iter().any(is_smooth),
-            parameters: anisotropic || !self.materials.textures.textures.is_empty(),
-            delta_materials: materials.iter().any(|material| material.flags().is_delta()),
             media: !in_use.is_empty(),
             participating_media: in_use.iter().any(Medium::is_participating),
             subsurface: check_walks(files, &desc.integrator, &subsurface)?,
-            anisotropic,
             lens: camera.lens().is_some(),
             motion: self.geometry.is_moving() || camera.is_moving(),
+            ..SceneFeatures::default()
         };
+        features.set_materials(&materials, &self.materials.textures.textures);
         Ok(Scene {
             geometry: Arc::new(self.geometry),
             surfaces: self.surfaces,
             materials,
+            plain_materials,
             normal_perturbations: self.materials.normal_perturbations,
             media: self.materials.media,
             part_normal_perturbations,

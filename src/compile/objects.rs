@@ -295,7 +295,7 @@ struct Level<'a> {
 }
 
 /// Whether it depends on the camera how a shape is refined.
-fn is_diced(shape: &ShapeDesc) -> bool {
+pub(super) fn is_diced(shape: &ShapeDesc) -> bool {
     let ShapeDesc::Mesh(mesh) = shape else { return false };
     mesh.subdivision.as_ref().is_some_and(|subdivision| subdivision.edge_length.is_some())
 }

@@ -403,6 +403,18 @@ impl DielectricDesc {
     }
 }
 
+impl MaterialDesc {
+    /// The names of the materials that it consists of.
+    pub(crate) fn part_names(&self) -> Vec<&str> {
+        match self {
+            Self::Mix { materials: [first, second], .. } => vec![first, second],
+            Self::TwoSided { front, back } => vec![front, back],
+            Self::Coated { base: part, .. } | Self::Relief { material: part, .. } => vec![part],
+            _ => Vec::new(),
+        }
+    }
+}
+
 fn zero() -> ScalarDesc {
     ScalarDesc::Constant(0.0)
 }

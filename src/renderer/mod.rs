@@ -30,7 +30,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use crate::compile::{CheckedScene, FileCache};
+use crate::compile::{CheckedScene, FileCache, SceneChanges};
 use crate::denoise::{Denoiser, add_features};
 use crate::desc::{FilterSamplesDesc, SceneDesc};
 use crate::error::{Error, Result};
@@ -38,7 +38,6 @@ use crate::film::LayerSet;
 use crate::import::{ImportOptions, ImportReport, Imported, SceneFingerprint, read_scene, scene_fingerprint};
 use crate::output::Format;
 use crate::render::{DEFAULT_EXTENSIONS, Overrides, Progress, RenderProvenance, Replayed, Settings, Silent, replay};
-use changes::Change;
 use job::Job;
 use loaded::LoadedScene;
 use state::StateFiles;
@@ -74,7 +73,7 @@ pub struct Renderer {
     stop: StopHandle,
     checkpoint_request: Arc<AtomicBool>,
     fingerprint: Option<SceneFingerprint>,
-    change: Change,
+    changes: SceneChanges,
     loaded: Option<LoadedScene>,
     files: Option<Arc<FileCache>>,
     /// When loading began.
@@ -169,7 +168,7 @@ impl Renderer {
             stop: StopHandle::default(),
             checkpoint_request: Arc::default(),
             fingerprint: None,
-            change: Change::Nothing,
+            changes: SceneChanges::default(),
             loaded: None,
             files: None,
             start: Instant::now(),

@@ -6,7 +6,6 @@ use serde_json::Value;
 
 use super::Renderer;
 use super::assignment::assign;
-use super::changes::Change;
 use crate::desc::SceneDesc;
 use crate::error::{Error, Result};
 use crate::suggestion::did_you_mean;
@@ -94,11 +93,15 @@ impl Renderer {
         assign(&mut wrapped, &keys, value.into());
         let replaced = replace(&mut self.imported.desc, &place, wrapped["part"].take());
         replaced.map_err(|message| self.fault(path, &message))?;
-        self.changed(match place.part.as_str() {
-            "camera" => Change::Camera,
-            "film" | "sampler" => Change::Nothing,
-            _ => Change::Anything,
-        });
+        let changes = self.changed();
+        match (place.part.as_str(), place.entry) {
+            // Subdivision follows the camera's pixels.
+            ("camera" | "film", _) => changes.camera = true,
+            ("sampler", _) => {}
+            ("materials", Some(name)) => drop(changes.materials.insert(name)),
+            ("lights", Some(number)) => drop(number.parse().map(|number| changes.lights.insert(number))),
+            _ => changes.others = true,
+        }
         Ok(())
     }
 

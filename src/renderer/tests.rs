@@ -3,6 +3,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use serde_json::json;
+
 use super::*;
 use crate::assets::MeshData;
 use crate::desc::{CameraDesc, ColorDesc, LayerKind, LightDesc, MaterialDesc, OpacityDesc, ShapeDesc};
@@ -81,10 +83,129 @@ fn a_changed_material_keeps_the_accelerator_and_gives_the_picture_of_a_new_rende
     assert!(renderer.set_material("ball", faulty).render().unwrap_err().to_string().contains("materials.ball.albedo"));
 }
 
+/// A scene with materials of every kind for what a change of one compiles.
+fn scene_of_parts() -> SceneDesc {
+    let json = json!({
+        "camera": { "position": [0, 1, 6], "look_at": [0, 0, 0] },
+        "textures": { "checks": { "type": "checker", "color0": [0.9, 0.8, 0.7], "color1": [0.1, 0.2, 0.1] } },
+        "materials": {
+            "ball": { "type": "conductor", "metal": "gold", "roughness": 0.2 },
+            "floor": { "type": "diffuse", "albedo": { "texture": "checks" } },
+            "wall": { "type": "diffuse", "albedo": [0.2, 0.5, 0.7] },
+            "part": { "type": "diffuse", "albedo": [0.7, 0.1, 0.1] },
+            "mixed": { "type": "mix", "materials": ["part", "wax"], "amount": 0.4 },
+            "wax": { "type": "plastic", "albedo": [0.1, 0.7, 0.1] },
+            "drop": { "type": "dielectric", "absorption": { "color": [0.5, 0.9, 0.9], "distance": 0.5 } }
+        },
+        "shapes": [
+            { "type": "sphere", "material": "ball", "radius": 0.8 },
+            { "type": "sphere", "material": "mixed", "radius": 0.5, "transform": [{ "translate": [-1.4, 0, 1] }] },
+            { "type": "sphere", "material": "drop", "radius": 0.5, "transform": [{ "translate": [1.4, 0, 1] }] },
+            { "type": "quad", "material": "floor", "origin": [-5, -1, 5], "edge_u": [10, 0, 0], "edge_v": [0, 0, -10] },
+            { "type": "quad", "material": "wall", "origin": [-5, -1, -2], "edge_u": [10, 0, 0], "edge_v": [0, 9, 0] },
+            {
+                "type": "sphere", "radius": 0.3, "emission": { "radiance": [3, 3, 3] },
+                "transform": [{ "translate": [-2, 2, 0] }]
+            }
+        ],
+        "lights": [
+            { "type": "environment", "radiance": [0.4, 0.5, 0.6] },
+            { "type": "point", "position": [2, 3, 3], "intensity": [20, 20, 20], "group": "key" }
+        ]
+    });
+    serde_json::from_value(json).unwrap()
+}
+
+#[test]
+fn constants_are_replaced_in_the_compiled_scene_and_other_changes_compile_it_again() {
+    let first = picture(scene_of_parts());
+    for (is_replaced, path, value) in [
+        (true, "materials.ball.roughness", json!(0.6)),
+        (true, "materials.ball", json!({ "type": "dielectric" })),
+        (true, "materials.ball", json!({ "type": "conductor", "metal": "gold", "roughness": [0.1, 0.6] })),
+        (true, "materials.wall", json!({ "type": "mirror" })),
+        (true, "lights[0].radiance", json!([0.9, 0.1, 0.1])),
+        (true, "lights[1].intensity", json!([3, 30, 3])),
+        (
+            true,
+            "lights[1]",
+            json!({ "type": "directional", "direction": [0, -1, -1], "irradiance": [2, 2, 2], "group": "key" }),
+        ),
+        // A texture, before or after; a medium; a walk below the surface; a part of another material; two parts.
+        (false, "materials.ball", json!({ "type": "diffuse", "albedo": { "texture": "checks" } })),
+        (false, "materials.floor.albedo", json!(0.5)),
+        (false, "materials.wall", json!({ "type": "dielectric", "priority": 1 })),
+        (false, "materials.drop", json!({ "type": "dielectric" })),
+        (false, "materials.wall", json!({ "type": "principled", "subsurface": 1, "subsurface_method": "random_walk" })),
+        (false, "materials.part.albedo", json!(0.9)),
+        (false, "materials.ball", json!({ "type": "mix", "materials": ["wall", "wax"] })),
+        // Another group; no light at infinity any more.
+        (
+            false,
+            "lights[1]",
+            json!({ "type": "point", "position": [0, 3, 3], "intensity": [9, 9, 9], "group": "fill" }),
+        ),
+        (false, "lights[0]", json!({ "type": "point", "position": [0, 3, 3], "intensity": [9, 9, 9] })),
+        (false, "textures.checks.color1", json!([0.1, 0.1, 0.9])),
+    ] {
+        let mut renderer = small(scene_of_parts());
+        renderer.load().unwrap();
+        let kept = geometry(&renderer);
+        renderer.change(path, value.clone()).unwrap();
+        let changed = renderer.render().unwrap().into_image();
+        assert_ne!(changed, first, "{path} {value}");
+        assert_eq!(changed, picture(renderer.scene().clone()), "{path} {value}");
+        // Files are kept from the first time that the scene is compiled again.
+        assert_eq!((renderer.files.is_none(), geometry(&renderer)), (is_replaced, kept), "{path} {value}");
+    }
+}
+
+#[test]
+fn a_change_after_a_fault_and_a_part_that_was_free_are_seen() {
+    let mut renderer = small(scene_of_parts());
+    let first = renderer.render().unwrap().into_image();
+    renderer.change("materials.ball.roughness", 0.6).unwrap();
+    renderer.change("lights[1].position", json!([1, 3, 3])).unwrap();
+    renderer.change("materials.wall.albedo", json!([2, 0, 0])).unwrap();
+    assert!(renderer.render().unwrap_err().to_string().contains("materials.wall.albedo"));
+    renderer.change("materials.wall.albedo", 0.3).unwrap();
+    let changed = renderer.render().unwrap().into_image();
+    assert_ne!(changed, first);
+    assert_eq!(changed, picture(renderer.scene().clone()));
+    // A coat is one of constants too, and its base then a part.
+    renderer.change("materials.ball", json!({ "type": "coated", "base": "wall" })).unwrap();
+    renderer.render().unwrap();
+    renderer.change("materials.wall.albedo", json!([0.9, 0.1, 0.1])).unwrap();
+    assert_eq!(renderer.render().unwrap().into_image(), picture(renderer.scene().clone()));
+}
+
+#[test]
+fn subdivision_follows_the_camera_and_the_film() {
+    let mut desc = scene();
+    let corners =
+        [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]];
+    let faces = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+    let mut mesh = ShapeDesc::mesh(&corners, &faces);
+    if let ShapeDesc::Mesh(mesh) = &mut mesh {
+        mesh.subdivision = serde_json::from_value(json!({ "scheme": "loop", "edge_length": 1 })).unwrap();
+    }
+    desc.shapes[0] = mesh;
+    (desc.film.width, desc.film.height, desc.sampler.spp) = (24, 16, 1);
+    let mut renderer = Renderer::from_desc(desc);
+    renderer.render().unwrap();
+    for (path, value) in [("camera.position", json!([0, 0.5, 2.5])), ("film.height", json!(64))] {
+        let before = geometry(&renderer);
+        renderer.change(path, value).unwrap();
+        let changed = renderer.render().unwrap().into_image();
+        assert_eq!(changed, Renderer::from_desc(renderer.scene().clone()).render().unwrap().into_image());
+        assert_ne!(geometry(&renderer), before);
+    }
+}
+
 #[test]
 fn parameters_have_the_paths_of_the_scene_format() {
     let mut renderer = small(scene());
-    assert_eq!(renderer.parameter("camera.position").unwrap(), serde_json::json!([0.0, 1.0, 6.0]));
+    assert_eq!(renderer.parameter("camera.position").unwrap(), json!([0.0, 1.0, 6.0]));
     assert_eq!(renderer.parameter("materials.ball.metal").unwrap(), "gold");
     assert_eq!(renderer.parameter("lights[0].radiance[2]").unwrap(), 1.0);
     renderer.render().unwrap();

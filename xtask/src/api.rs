@@ -1,5 +1,6 @@
 //! The library's public interface as text: `cargo xtask api` writes `api.txt` from the pages that `cargo doc` makes,
 //! and `cargo xtask api --check` fails if the file is not up to date, so that no change of the interface goes unseen.
+//! With `--documented` the pages are those of the last `cargo doc`, which must have left out private items.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -12,8 +13,9 @@ type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
 pub fn run(arguments: &[String]) -> Outcome {
     let file = root().join("api.txt");
-    let found = interface(&pages()?)?;
-    if !arguments.iter().any(|argument| argument == "--check") {
+    let has = |option: &str| arguments.iter().any(|argument| argument == option);
+    let found = interface(&pages(has("--documented"))?)?;
+    if !has("--check") {
         return Ok(fs::write(&file, found)?);
     }
     let kept = fs::read_to_string(&file)?;
@@ -29,10 +31,13 @@ pub fn run(arguments: &[String]) -> Outcome {
         .into())
 }
 
-/// Makes the documentation of what is public; the result is its folder.
-fn pages() -> Result<PathBuf> {
+/// Makes the documentation of what is public, unless it is there; the result is its folder.
+fn pages(is_made: bool) -> Result<PathBuf> {
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from);
     let folder = target.join("doc/steradian");
+    if is_made {
+        return Ok(folder);
+    }
     // It may be that of private items.
     if folder.exists() {
         fs::remove_dir_all(&folder)?;

@@ -10,7 +10,9 @@ use steradian::internal::render::{Overrides, Settings};
 use steradian::internal::{compile, output};
 use steradian::{Error, Result};
 use steradian_bench::Watch;
-use steradian_bench::error::{Budget, ErrorOptions, External, Standard, Subject, Variant, bench_error};
+use steradian_bench::error::{
+    Budget, ErrorOptions, External, Peer, PeerOptions, Standard, Subject, Variant, bench_error,
+};
 use steradian_bench::report::Report;
 
 use crate::args::{BenchErrorArgs, Verbosity};
@@ -71,6 +73,13 @@ fn options(arguments: &BenchErrorArgs, desc: &SceneDesc, reference: Standard) ->
         let external = External::new(name, command, &arguments.scene, &budgets)?;
         variants.push(Variant { name: name.clone(), subject: Subject::External(external) });
     }
+    for (name, external) in peers(arguments, desc, &reference, &budgets)? {
+        variants.push(Variant { name, subject: Subject::External(external) });
+    }
+    if variants.is_empty() {
+        let message = "--only-external needs --external, --peer, or --peers with a renderer that is installed";
+        return Err(Error::Usage(message.to_owned()));
+    }
     for (i, variant) in variants.iter().enumerate() {
         if variants[..i].iter().any(|other| other.name == variant.name) {
             return Err(Error::Usage(format!("two variants have the name {}", variant.name)));
@@ -86,6 +95,40 @@ fn options(arguments: &BenchErrorArgs, desc: &SceneDesc, reference: Standard) ->
         reference,
         tax: arguments.tax,
     })
+}
+
+/// The renderers of `--peer` and `--peers`, with their names.
+fn peers(
+    arguments: &BenchErrorArgs,
+    desc: &SceneDesc,
+    reference: &Standard,
+    budgets: &[Budget],
+) -> Result<Vec<(String, External)>> {
+    let mut peers: Vec<(Peer, &Path)> = Vec::new();
+    for (peer, file) in &arguments.peers {
+        peers.push((*peer, file.as_deref().unwrap_or(&arguments.scene)));
+    }
+    for peer in Peer::ALL.into_iter().filter(|_| arguments.all_peers) {
+        let is_named = peers.iter().any(|(other, _)| *other == peer);
+        if !is_named && peer.reads(&arguments.scene) && peer.is_installed(&arguments.python)? {
+            peers.push((peer, &arguments.scene));
+        }
+    }
+    if peers.is_empty() {
+        return Ok(Vec::new());
+    }
+    let size = match reference {
+        Standard::File(_, image) => [image.crop.width, image.crop.height],
+        Standard::Halves => arguments.size.unwrap_or([desc.film.width, desc.film.height]),
+    };
+    let options = PeerOptions {
+        python: arguments.python.clone(),
+        size,
+        threads: arguments.threads.unwrap_or(0),
+        defines: arguments.import.defines.clone(),
+    };
+    let named = |(peer, scene): (Peer, &Path)| Ok((peer.name().to_owned(), peer.command(scene, &options, budgets)?));
+    peers.into_iter().map(named).collect()
 }
 
 /// Every combination of what was given, named by what differs.

@@ -11,6 +11,8 @@ mod packet;
 mod replay;
 mod scene;
 mod sys;
+#[cfg(test)]
+mod tests;
 
 pub use device::EmbreeInfo;
 pub use replay::EmbreeReplay;
@@ -91,6 +93,8 @@ pub struct EmbreeAccel<'g> {
     device: Device,
     geometry: &'g Geometry,
     bounds: Aabb,
+    /// Whether rays of batches are traced one by one, which Embree does faster with curves (`docs/curves.md`).
+    one_by_one: bool,
 }
 
 impl<'g> EmbreeAccel<'g> {
@@ -119,7 +123,9 @@ impl<'g> EmbreeAccel<'g> {
         // It must be dropped before the user data and the objects' scenes.
         let scene = world.commit()?;
         let tracer = Tracer { scene, gate, frusta: geometry.instances.is_empty(), cutouts: geometry.cutouts.clone() };
-        Ok(Self { tracer, user_shapes, entered, _objects: objects, device, geometry, bounds: geometry.bounds() })
+        let one_by_one = user_shapes.are_mostly_curves(geometry);
+        let bounds = geometry.bounds();
+        Ok(Self { tracer, user_shapes, entered, _objects: objects, device, geometry, bounds, one_by_one })
     }
 
     /// What Embree calls back for, or keeps beside triangles at rest.
@@ -236,6 +242,9 @@ impl Accelerator for EmbreeAccel<'_> {
     }
 
     fn intersect_rows(&self, rays: &RayRows, count: usize, hits: &mut HitRows, coherence: Coherence) {
+        if self.one_by_one {
+            return (0..count.min(BATCH)).for_each(|lane| hits.set(lane, self.intersect(&rays.get(lane))));
+        }
         let mut packet = HitPacket::new();
         for first in (0..count.min(BATCH)).step_by(WIDTH) {
             packet.intersect(&self.tracer, rays, first..count.min(first + WIDTH), coherence);
@@ -247,6 +256,9 @@ impl Accelerator for EmbreeAccel<'_> {
     }
 
     fn occluded_rows(&self, rays: &RayRows, count: usize, occluded: &mut [bool; BATCH], coherence: Coherence) {
+        if self.one_by_one {
+            return (0..count.min(BATCH)).for_each(|lane| occluded[lane] = self.occluded(&rays.get(lane)));
+        }
         let mut packet = ShadowPacket::new();
         for first in (0..count.min(BATCH)).step_by(WIDTH) {
             let lanes = first..count.min(first + WIDTH);

@@ -42,7 +42,8 @@ impl<'a, 'g> EmbreeReplay<'a, 'g> {
         Self { accel, chunks: Vec::new() }
     }
 
-    /// Adds rays that were handed over together; one by one if their coherence is unspecified. Rays that the
+    /// Adds rays that were handed over together; one by one if their coherence is unspecified, or the
+    /// accelerator traces all so. Rays that the
     /// accelerator traces without Embree are left out.
     pub fn push(&mut self, rays: &[Ray], any_hit: bool, coherence: Option<Coherence>) {
         if self.chunks.last().is_none_or(|chunk| chunk.rays >= CHUNK) {
@@ -50,7 +51,7 @@ impl<'a, 'g> EmbreeReplay<'a, 'g> {
         }
         let Some(chunk) = self.chunks.last_mut() else { return };
         let tracer = &self.accel.tracer;
-        match coherence {
+        match coherence.filter(|_| !self.accel.one_by_one) {
             None => rays.iter().for_each(|ray| chunk.push_single(tracer, ray, any_hit)),
             Some(coherence) => {
                 for run in rays.chunks(WIDTH) {

@@ -11,9 +11,12 @@ use super::callbacks::{
 use super::device::Device;
 use super::{EmbreeOptions, EmbreeQuality, sys};
 use crate::error::{Error, Result};
-use crate::geometry::{Geometry, Instance, Mesh, Shape};
+use crate::geometry::{CurveBasis, Curves, Geometry, Instance, Mesh, Shape};
 use crate::id::ShapeId;
 use crate::math::Aabb;
+
+/// Hits with curves that are closer to the origin of a ray than so many radii are confirmed in `f64`.
+const CONFIRMED_RADII: f32 = 4.0;
 
 /// What Embree's callbacks need of one shape. Embree keeps addresses of it.
 pub(super) enum UserData {
@@ -25,6 +28,26 @@ pub(super) enum UserData {
     Analytic(sys::StUserShape, #[allow(dead_code)] Option<Box<Filter>>),
     /// Curves or points.
     Primitives(sys::StUserPrimitives, #[allow(dead_code)] Box<Filter>),
+    /// Curves that Embree intersects.
+    Curves(sys::StCurves, #[allow(dead_code)] Box<Filter>),
+}
+
+impl UserData {
+    /// That of curves or points.
+    fn of_primitives(shape: &Shape, has_holes: bool, filter: Box<Filter>) -> Self {
+        let primitives = sys::StUserPrimitives {
+            shape: std::ptr::from_ref(&*filter).cast::<c_void>(),
+            count: shape.prim_count() as u32,
+            intersect: Some(intersect_primitive),
+            bounds: Some(primitive_bounds),
+        };
+        match shape {
+            Shape::Curves(curves) if !has_holes && curves.is_swept_disk() => {
+                Self::Curves(sys::StCurves { primitives, reach: CONFIRMED_RADII * curves.max_radius() }, filter)
+            }
+            _ => Self::Primitives(primitives, filter),
+        }
+    }
 }
 
 /// The user data of every shape, by [`ShapeId`].
@@ -81,13 +104,7 @@ impl UserShapes {
                 }
                 (Shape::Curves(_) | Shape::Points(_), filter) => {
                     let filter = filter.unwrap_or_else(|| Box::new(Filter::new(geometry, id)));
-                    let raw = sys::StUserPrimitives {
-                        shape: std::ptr::from_ref(&*filter).cast::<c_void>(),
-                        count: shape.prim_count() as u32,
-                        intersect: Some(intersect_primitive),
-                        bounds: Some(primitive_bounds),
-                    };
-                    UserData::Primitives(raw, filter)
+                    UserData::of_primitives(shape, has_holes, filter)
                 }
             }
         };
@@ -101,6 +118,16 @@ impl UserShapes {
             count(|data| matches!(data, UserData::FilteredTriangles(..))),
             count(|data| matches!(data, UserData::Analytic(..) | UserData::Primitives(..))),
         ]
+    }
+
+    /// Whether more than half of all primitives are curves that Embree intersects.
+    pub(super) fn are_mostly_curves(&self, geometry: &Geometry) -> bool {
+        let is_native = |data: &UserData| matches!(data, UserData::Curves(..));
+        let (all, curves) = self.0.iter().zip(&geometry.shapes).fold((0, 0), |(all, curves), (data, shape)| {
+            let count = shape.prim_count();
+            (all + count, curves + if is_native(data) { count } else { 0 })
+        });
+        2 * curves > all
     }
 
     /// The entry of one shape.
@@ -181,6 +208,8 @@ impl GeometryHandle {
                 let handle = unsafe { sys::st_new_user_primitives(device.handle(), user) };
                 Self::new(device, handle)
             }
+            // SAFETY: the caller keeps the curves and the user data alive.
+            (Shape::Curves(curves), UserData::Curves(user, _)) => unsafe { Self::of_curves(device, curves, user) },
             _ => Err(Error::Internal("user data of another shape".into())),
         }
     }
@@ -198,17 +227,10 @@ impl GeometryHandle {
         unsafe {
             sys::rtcSetGeometryTimeStepCount(handle, mesh.padded_steps().count() as u32);
             for (step, positions) in (0..).zip(mesh.padded_steps()) {
-                let data = positions.as_ptr().cast();
-                this.share(sys::RTC_BUFFER_TYPE_VERTEX, step, sys::RTC_FORMAT_FLOAT3, data, positions.len() - 1);
+                let positions = &positions[..positions.len() - 1];
+                this.share(sys::RTC_BUFFER_TYPE_VERTEX, step, sys::RTC_FORMAT_FLOAT3, positions);
             }
-            let triangles = mesh.triangles();
-            this.share(
-                sys::RTC_BUFFER_TYPE_INDEX,
-                0,
-                sys::RTC_FORMAT_UINT3,
-                triangles.as_ptr().cast(),
-                triangles.len(),
-            );
+            this.share(sys::RTC_BUFFER_TYPE_INDEX, 0, sys::RTC_FORMAT_UINT3, mesh.triangles());
             if let Some(filter) = filter {
                 sys::st_set_filter(handle, filter);
             }
@@ -217,20 +239,38 @@ impl GeometryHandle {
         Ok(this)
     }
 
-    /// Shares `count` items of 12 bytes.
+    /// Curves on their own buffers.
     ///
     /// # Safety
-    /// There must be as many, and they must outlive the geometry.
-    unsafe fn share(
-        &self,
-        kind: sys::RTCBufferType,
-        slot: u32,
-        format: sys::RTCFormat,
-        items: *const c_void,
-        count: usize,
-    ) {
+    /// As for [`of_shape`](Self::of_shape).
+    unsafe fn of_curves(device: &Device, curves: &Curves, user: &sys::StCurves) -> Result<Self> {
+        let kind = match curves.basis() {
+            CurveBasis::Bezier => sys::RTC_GEOMETRY_TYPE_ROUND_BEZIER_CURVE,
+            CurveBasis::BSpline => sys::RTC_GEOMETRY_TYPE_ROUND_BSPLINE_CURVE,
+            CurveBasis::CatmullRom => sys::RTC_GEOMETRY_TYPE_ROUND_CATMULL_ROM_CURVE,
+            CurveBasis::Linear => return Err(Error::Internal("curves without tangents".into())),
+        };
+        // SAFETY: the device is alive.
+        let handle = unsafe { sys::rtcNewGeometry(device.handle(), kind) };
+        let this = Self::new(device, handle)?;
+        // SAFETY: as in `of_mesh`; items of 16 and of 4 bytes are read whole.
+        unsafe {
+            this.share(sys::RTC_BUFFER_TYPE_VERTEX, 0, sys::RTC_FORMAT_FLOAT4, curves.points());
+            this.share(sys::RTC_BUFFER_TYPE_INDEX, 0, sys::RTC_FORMAT_UINT, curves.first_points());
+            sys::st_set_curve_filter(handle, user);
+            sys::rtcCommitGeometry(handle);
+        }
+        Ok(this)
+    }
+
+    /// Shares items, of which Embree reads those of `format` at the size of `T` from each other.
+    ///
+    /// # Safety
+    /// They must be of that format, and must outlive the geometry.
+    unsafe fn share<T>(&self, kind: sys::RTCBufferType, slot: u32, format: sys::RTCFormat, items: &[T]) {
+        let (data, size) = (items.as_ptr().cast(), size_of::<T>());
         // SAFETY: the handle is alive; the rest is guaranteed by the caller.
-        unsafe { sys::rtcSetSharedGeometryBuffer(self.0.as_ptr(), kind, slot, format, items, 0, 12, count) }
+        unsafe { sys::rtcSetSharedGeometryBuffer(self.0.as_ptr(), kind, slot, format, data, 0, size, items.len()) }
     }
 
     /// The committed geometry of an instance into whose space we move the rays.

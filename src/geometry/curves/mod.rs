@@ -153,6 +153,39 @@ impl Curves {
         self.kind
     }
 
+    /// How control points make the curves.
+    pub fn basis(&self) -> CurveBasis {
+        self.basis
+    }
+
+    /// The control points: x, y, z and the radius.
+    pub fn points(&self) -> &[[f32; 4]] {
+        &self.points
+    }
+
+    /// The number of the first control point of each segment.
+    pub fn first_points(&self) -> &[u32] {
+        &self.segments
+    }
+
+    /// The largest radius of a control point.
+    pub fn max_radius(&self) -> f32 {
+        self.points.iter().fold(0.0, |most, point| most.max(point[3]))
+    }
+
+    /// Whether disks across the curves sweep the same surface as spheres along them, but for 1.2 % of the radius: tubes
+    /// without corners that taper slowly. One segment in a hundred may do otherwise, such as one that turns back.
+    pub fn is_swept_disk(&self) -> bool {
+        const MOST_OTHERS: usize = 100;
+        let is_joined = self.basis.has_corners() && self.strand_count() < self.prim_count();
+        if self.kind != CurveKind::Round || self.basis == CurveBasis::Linear || is_joined {
+            return false;
+        }
+        let mut segments = (0..self.prim_count()).map(|i| self.segment(PrimId::new(i)));
+        let others = segments.by_ref().filter(|segment| !segment.is_slender()).count();
+        others * MOST_OTHERS <= self.prim_count() && self.points.iter().all(is_sized)
+    }
+
     /// How many segments there are.
     pub fn prim_count(&self) -> usize {
         self.segments.len()
@@ -268,6 +301,12 @@ impl Curves {
 
 fn index(i: usize) -> Result<u32, CurvesError> {
     u32::try_from(i).map_err(|_| CurvesError::TooMany)
+}
+
+/// Whether squares of sizes are far from the limits of `f32`.
+fn is_sized([x, y, z, radius]: &[f32; 4]) -> bool {
+    const MAX_SIZE: f32 = 1e9;
+    [x, y, z, radius].iter().all(|size| size.abs() < MAX_SIZE)
 }
 
 /// Rejects points that are not finite and radii below 0.

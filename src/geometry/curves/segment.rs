@@ -38,6 +38,12 @@ const MAX_STEPS: u32 = 48;
 /// A hit closer than this many radii is that of the ribbon that the ray starts on, which faces another ray.
 const FLAT_START: f64 = 2.0;
 
+/// The largest change of the radius by length with which a curve is slender.
+const MAX_SLOPE: f64 = 0.15;
+
+/// Its square is far from the limits of `f32`.
+const MIN_SIZE: f64 = 1e-9;
+
 /// Bernstein-Bezier control points, `w` is the radius.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Segment(pub [DVec4; 4]);
@@ -117,6 +123,19 @@ impl Segment {
         let [a, b, c, d] = self.0;
         let second = |p: DVec4, q: DVec4, r: DVec4| (p - 2.0 * q + r).truncate().length_squared();
         0.75 * second(a, b, c).max(second(b, c, d)).sqrt()
+    }
+
+    /// Whether the curve runs along its chord all the way, and the radius, above 0, changes by less than 0.15 of the
+    /// length: an envelope of spheres is then a tube of disks, as far as second orders (1.2 %) do not count.
+    pub fn is_slender(&self) -> bool {
+        let [a, b, c, d] = self.0;
+        let chord = (d - a).truncate();
+        let Some(along) = chord.try_normalize() else { return false };
+        let advances = |p: DVec4, q: DVec4| (q - p).truncate().dot(along);
+        let least = advances(a, b).min(advances(b, c)).min(advances(c, d));
+        let steps = [b - a, c - b, d - c].map(|step| step.w.abs());
+        let is_sized = chord.length() > MIN_SIZE && self.max_radius() > MIN_SIZE;
+        is_sized && least > 0.0 && steps.iter().all(|&step| step < MAX_SLOPE * least)
     }
 
     /// The point and its derivative.

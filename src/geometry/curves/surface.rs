@@ -37,12 +37,12 @@ impl Curves {
         let [center, derivative] = segment.at(found.u);
         let raw = space.origin + space.direction() * found.distance;
         let tangent = self.tangent(hit.prim, derivative);
-        let at = match self.kind {
-            CurveKind::Round => self.on_tube(hit.prim, raw, center, tangent),
-            kind => on_ribbon(kind, space.direction(), raw, center, tangent),
-        }?;
         let strand = self.strand(hit.prim);
         let [first, end] = [self.strands[strand], self.strands[strand + 1]];
+        let at = match self.kind {
+            CurveKind::Round => self.on_tube([first, end], raw, center, tangent),
+            kind => on_ribbon(kind, space.direction(), raw, center, tangent),
+        }?;
         let segments = f64::from(end - first);
         let along = (f64::from(hit.prim.0 - first) + found.u) / segments;
         let uv = match &self.root_uvs {
@@ -77,12 +77,11 @@ impl Curves {
             .unwrap_or(DVec3::Z)
     }
 
-    /// The point of a tube's sphere `center` next to `raw`.
-    fn on_tube(&self, prim: PrimId, raw: DVec3, center: DVec4, tangent: DVec3) -> Option<CurvePoint> {
+    /// The point of a tube's sphere `center` next to `raw`, on the strand of the segments from `first` to before `end`.
+    fn on_tube(&self, [first, end]: [u32; 2], raw: DVec3, center: DVec4, tangent: DVec3) -> Option<CurvePoint> {
         let n = (raw - center.truncate()).try_normalize()?;
         // The angle is that from the axis that a strand leaves alone most, so that v does not turn along it.
-        let strand = self.strand(prim);
-        let [root, tip] = [self.strands[strand], self.strands[strand + 1] - 1].map(|i| self.segment(PrimId(i)).0);
+        let [root, tip] = [first, end - 1].map(|i| self.segment(PrimId(i)).0);
         let chord = (tip[3] - root[0]).truncate().abs();
         let axis = if chord.x <= chord.y.min(chord.z) {
             DVec3::X

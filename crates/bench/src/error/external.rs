@@ -18,6 +18,10 @@ pub struct External {
     name: String,
     template: String,
     scene: PathBuf,
+    /// What the command reads from standard input.
+    input: Option<&'static str>,
+    /// The option that named it, for messages.
+    option: &'static str,
 }
 
 impl External {
@@ -38,16 +42,25 @@ impl External {
             Some(Budget::Seconds(_)) => needs("{seconds}", "the time that it may take, of --times")?,
             _ => needs("{spp}", "the samples per pixel, of --spp")?,
         }
-        Ok(Self { name: name.to_owned(), template: template.to_owned(), scene: scene.to_owned() })
+        let (name, template, scene) = (name.to_owned(), template.to_owned(), scene.to_owned());
+        Ok(Self { name, template, scene, input: None, option: "--external" })
+    }
+
+    /// A command that reads a script from standard input and takes the scene and the options `--spp`, `--seed` and
+    /// `--out`.
+    pub(super) fn script(name: &str, words: &[String], script: &'static str, scene: &Path) -> Self {
+        let words: Vec<String> = words.iter().map(|word| quoted(word)).collect();
+        let template = format!("{} --spp {{spp}} --seed {{seed}} --out {{out}} {{scene}}", words.join(" "));
+        Self { name: name.to_owned(), template, scene: scene.to_owned(), input: Some(script), option: "--peer" }
     }
 
     /// Runs the command; `None` if interrupted.
     pub(super) fn run(&self, budget: Budget, seed: u64, stop: &AtomicBool) -> Result<Option<Measured>> {
-        let failed = |message: String| Error::Internal(format!("--external {}: {message}", self.name));
+        let failed = |message: String| Error::Internal(format!("{} {}: {message}", self.option, self.name));
         let folder = tempfile::tempdir().map_err(|e| failed(format!("no folder for its files: {e}")))?;
         let out = folder.path().join("out.exr");
         let line = self.line(&out, budget, seed);
-        let ended = child::run(Command::new("sh").args(["-c", &line]), None, stop).map_err(failed)?;
+        let ended = child::run(Command::new("sh").args(["-c", &line]), self.input, stop).map_err(failed)?;
         let Some(Ended { status, seconds: process_seconds, processor_seconds, stdout, stderr }) = ended else {
             return Ok(None);
         };
@@ -62,7 +75,10 @@ impl External {
             seconds: printed.seconds.unwrap_or(process_seconds),
             process_seconds: Some(process_seconds),
             // How many threads it started is not known: the share of their time is not judged.
-            spent: Spent { processor_seconds, ..Spent::default() },
+            spent: Spent {
+                processor_seconds: printed.processor_seconds.unwrap_or(processor_seconds),
+                ..Spent::default()
+            },
             spp,
             samples: spp.map(|spp| u64::from(spp) * image.crop.area()),
             rays: None,
@@ -73,7 +89,7 @@ impl External {
 
     /// The command, its words for the shell filled in.
     fn line(&self, out: &Path, budget: Budget, seed: u64) -> String {
-        let quote = |path: &Path| format!("'{}'", path.to_string_lossy().replace('\'', r"'\''"));
+        let quote = |path: &Path| quoted(&path.to_string_lossy());
         let line = match budget {
             Budget::Spp(spp) => self.template.replace("{spp}", &spp.to_string()),
             Budget::Seconds(seconds) => self.template.replace("{seconds}", &seconds.to_string()),
@@ -82,18 +98,25 @@ impl External {
     }
 }
 
+/// One word for the shell.
+fn quoted(word: &str) -> String {
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
 /// Statistics that a renderer prints to standard output as JSON.
 #[derive(Debug, Default, PartialEq)]
 struct PrintedStatistics {
     /// Seconds of the render without what comes before.
     seconds: Option<f64>,
+    /// Processor seconds of the same.
+    processor_seconds: Option<f64>,
     /// Samples per pixel done.
     spp: Option<u32>,
 }
 
 impl PrintedStatistics {
-    /// In the whole text or in one of its lines: Steradian's statistics, or an object with `runs`, whose last has
-    /// `render_s`.
+    /// In the whole text or in one of its lines: `render_seconds`, `processor_seconds` and `spp`, or an object with
+    /// `runs`, whose last has `render_s`, `cpu_s` and `eff_spp`.
     fn in_text(text: &str) -> Self {
         let objects = std::iter::once(text).chain(text.lines().filter(|line| line.starts_with('{')));
         let values = objects.filter_map(|object| serde_json::from_str::<Value>(object).ok());
@@ -105,8 +128,11 @@ impl PrintedStatistics {
         let first = |value: &Value| value.as_f64().or_else(|| value.get(0).and_then(Value::as_f64));
         let seconds = first(&run["render_s"]).or_else(|| first(&run["render_seconds"]));
         let spp = first(&run["eff_spp"]).or_else(|| first(&run["spp"]));
+        let processor_seconds = first(&run["cpu_s"]).or_else(|| first(&run["processor_seconds"]));
+        let positive = |seconds: Option<f64>| seconds.filter(|s| s.is_finite() && *s > 0.0);
         Self {
-            seconds: seconds.filter(|s| s.is_finite() && *s > 0.0),
+            seconds: positive(seconds),
+            processor_seconds: positive(processor_seconds),
             spp: spp.filter(|n| *n >= 1.0).map(|n| n.round() as u32),
         }
     }
@@ -166,10 +192,17 @@ mod tests {
 
     #[test]
     fn statistics_are_read_from_standard_output() {
-        let printed = |seconds, spp| PrintedStatistics { seconds: Some(seconds), spp: Some(spp) };
-        assert_eq!(PrintedStatistics::in_text("{\n \"render_seconds\": 1.5,\n \"spp\": 16\n}\n"), printed(1.5, 16));
-        let line =
-            "noise\n{\"load_s\": 1, \"runs\": [{\"render_s\": [9]}, {\"render_s\": [0.25, 0.3], \"eff_spp\": 16.4}]}\n";
+        let printed = |seconds, spp| PrintedStatistics {
+            seconds: Some(seconds),
+            processor_seconds: Some(2.0 * seconds),
+            spp: Some(spp),
+        };
+        assert_eq!(
+            PrintedStatistics::in_text("{\"render_seconds\": 1.5,\n\"processor_seconds\": 3, \"spp\": 16}\n"),
+            printed(1.5, 16)
+        );
+        let line = "noise\n{\"load_s\": 1, \"runs\": [{\"render_s\": [9]}, {\"render_s\": [0.25, 0.3], \
+                    \"cpu_s\": [0.5], \"eff_spp\": 16.4}]}\n";
         assert_eq!(PrintedStatistics::in_text(line), printed(0.25, 16));
         assert_eq!(PrintedStatistics::in_text("{}\n{ broken"), PrintedStatistics::default());
         assert_eq!(PrintedStatistics::in_text("Rendering 4 s"), PrintedStatistics::default());

@@ -5,6 +5,7 @@
 
 mod bias;
 mod external;
+mod peers;
 mod plan;
 mod report;
 mod summary;
@@ -12,6 +13,7 @@ mod tax;
 mod viewer;
 
 pub use external::External;
+pub use peers::{Peer, PeerOptions};
 pub use plan::{Budget, ErrorOptions, Standard, Subject, Variant};
 pub use summary::{Bias, EqualError, ErrorReport, Point, ReferenceInfo, Run, VariantReport};
 pub use tax::TaxReport;

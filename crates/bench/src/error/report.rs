@@ -1,6 +1,6 @@
 //! The report of `bench error`.
 
-use super::{ErrorReport, Point, TaxReport};
+use super::{EqualError, ErrorReport, Point, TaxReport};
 use crate::report::{
     Curve, Curves, Dots, Drawing, Figure, Page, Report, Section, Table, interrupted, number, or_dash, range,
 };
@@ -86,15 +86,18 @@ impl ErrorReport {
         };
         let mut parts = Vec::new();
         for (i, variant) in self.variants.iter().enumerate().skip(1) {
-            let Some(ratio) = self.equal_error.as_ref().and_then(|equal| equal.times_as_fast[i]) else { continue };
+            // By processor time: other work on the machine changes it little.
+            let Some(ratio) = self.equal_error.as_ref().and_then(|equal| equal.times_as_fast_by_processor[i]) else {
+                continue;
+            };
             let (name, first) = (&variant.name, &first.name);
             parts.push(if ratio[1] < 1.0 && ratio[2] > 1.0 {
                 format!(
-                    "{name}: {} as fast as {first} to equal error, so no difference beyond the spread",
+                    "{name}: {} as fast as {first} to equal error by processor time: no difference beyond spread",
                     times(ratio)
                 )
             } else {
-                format!("{name}: {} as fast as {first} to equal error", times(ratio))
+                format!("{name}: {} as fast as {first} to equal error by processor time", times(ratio))
             });
         }
         if parts.is_empty()
@@ -151,8 +154,8 @@ impl ErrorReport {
              bright pixels."
         ));
         if self.variants.iter().any(|variant| variant.external) {
-            let text = "Other programs: the time that they report of themselves on standard output, else that of their \
-                        whole process; processor time of their whole process.";
+            let text = "Other programs: seconds and processor seconds that they report of themselves on standard \
+                        output, else those of their whole process.";
             notes.push(text.to_owned());
         }
         notes
@@ -189,15 +192,27 @@ impl ErrorReport {
         let equal = self.equal_error.as_ref();
         let mut table = Table::new(
             "Least squares of the logarithms; -1: independent samples",
-            "variant | slope of relMSE over time | slope over spp | s to equal relMSE | against the first",
+            "variant | slope of relMSE over time | slope over spp | s to equal relMSE | against the first | processor \
+             s | against the first by processor s",
         );
-        table.heads[3] = equal.map_or(String::new(), |equal| format!("s to relMSE {}", number(equal.relmse)));
+        if let Some(equal) = equal {
+            table.heads[3] = format!("s to relMSE {}", number(equal.relmse));
+        }
         for (i, variant) in self.variants.iter().enumerate() {
             let slope = |slope: Option<f64>| or_dash(slope.map(|slope| format!("{slope:.2}")));
-            let seconds = equal.and_then(|equal| equal.seconds[i]).map(number);
-            let ratio = equal.and_then(|equal| equal.times_as_fast[i]).map(|ratio| format!("{} as fast", times(ratio)));
-            let slopes = [slope(variant.slope_of_time), slope(variant.slope_of_spp)];
-            table.rows.push([&[variant.name.clone()][..], &slopes, &[or_dash(seconds), or_dash(ratio)]].concat());
+            let seconds = |all: fn(&EqualError) -> &[Option<f64>]| or_dash(equal.and_then(|e| all(e)[i]).map(number));
+            let ratio = |all: fn(&EqualError) -> &[Option<[f64; 3]>]| {
+                or_dash(equal.and_then(|e| all(e)[i]).map(|ratio| format!("{} as fast", times(ratio))))
+            };
+            table.rows.push(vec![
+                variant.name.clone(),
+                slope(variant.slope_of_time),
+                slope(variant.slope_of_spp),
+                seconds(|equal| &equal.seconds),
+                ratio(|equal| &equal.times_as_fast),
+                seconds(|equal| &equal.processor_seconds),
+                ratio(|equal| &equal.times_as_fast_by_processor),
+            ]);
         }
         table
     }

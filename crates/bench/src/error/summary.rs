@@ -151,6 +151,10 @@ pub struct EqualError {
     pub seconds: Vec<Option<f64>>,
     /// By variant: how many times as fast as the first it is, for each repeat; median, lowest and highest.
     pub times_as_fast: Vec<Option<[f64; 3]>>,
+    /// As `seconds`, in processor seconds of all threads together.
+    pub processor_seconds: Vec<Option<f64>>,
+    /// As `times_as_fast`, by processor seconds.
+    pub times_as_fast_by_processor: Vec<Option<[f64; 3]>>,
 }
 
 impl Bias {
@@ -205,18 +209,25 @@ impl ErrorReport {
             variant.slope_of_time = slope(&variant.curve());
             variant.slope_of_spp = slope(&variant.curve_of_spp());
         }
-        let curves: Vec<Vec<(f64, f64)>> = self.variants.iter().map(VariantReport::curve).collect();
-        self.equal_error = equal_error(&curves).map(|(relmse, seconds)| {
-            let times_as_fast = self.times_as_fast();
-            EqualError { relmse, seconds, times_as_fast }
+        let times =
+            |of: fn(&VariantReport) -> Vec<(f64, f64)>| equal_error(&self.variants.iter().map(of).collect::<Vec<_>>());
+        let by_time = times(VariantReport::curve);
+        let by_processor = times(|variant| variant.curve_over(|point| Some(point.processor_seconds[0])));
+        self.equal_error = by_time.zip(by_processor).map(|((relmse, seconds), (_, processor_seconds))| EqualError {
+            relmse,
+            seconds,
+            times_as_fast: self.times_as_fast(|run| run.seconds),
+            processor_seconds,
+            times_as_fast_by_processor: self.times_as_fast(|run| run.processor_seconds),
         });
     }
 
     /// How many times as fast as the first each variant reaches the same error, over the repeats.
-    fn times_as_fast(&self) -> Vec<Option<[f64; 3]>> {
+    fn times_as_fast(&self, seconds_of: fn(&Run) -> f64) -> Vec<Option<[f64; 3]>> {
         let mut ratios = vec![Vec::new(); self.variants.len()];
         for repeat in 0..self.repeats {
-            let curves: Vec<_> = self.variants.iter().map(|variant| variant.curve_of_repeat(repeat)).collect();
+            let curves: Vec<_> =
+                self.variants.iter().map(|variant| variant.curve_of_repeat(repeat, seconds_of)).collect();
             let Some((_, seconds)) = equal_error(&curves) else { continue };
             for (ratios, own) in ratios.iter_mut().zip(&seconds) {
                 ratios.extend(seconds[0].zip(*own).map(|(first, own)| first / own));
@@ -238,9 +249,9 @@ impl VariantReport {
     }
 
     /// Seconds and relMSE of one repeat, by time.
-    fn curve_of_repeat(&self, repeat: usize) -> Vec<(f64, f64)> {
+    fn curve_of_repeat(&self, repeat: usize, seconds_of: fn(&Run) -> f64) -> Vec<(f64, f64)> {
         let runs = self.points.iter().filter_map(|point| point.runs.iter().find(|run| run.repeat == repeat));
-        sorted(runs.map(|run| (run.seconds, run.relmse)))
+        sorted(runs.map(|run| (seconds_of(run), run.relmse)))
     }
 
     fn curve_over(&self, of: impl Fn(&Point) -> Option<f64>) -> Vec<(f64, f64)> {

@@ -7,7 +7,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::geometry::Rng;
 use super::render::{pixels, render};
-use super::{Effort, Outcome, sidak_level};
+use super::{Effort, Faults, Outcome, sidak_level};
 use crate::camera::{Blades, Camera, Framing, Lens, Projection};
 use crate::film::Image;
 use crate::math::float::UNIT_ROUNDOFF;
@@ -56,7 +56,7 @@ fn at_depth(pose: &DAffine3, ray: &Ray, depth: f64) -> DVec3 {
 
 fn k1_thin_lens(effort: Effort) -> Outcome {
     let mut rng = Rng::new(1);
-    let (mut meet, mut center, mut outside) = (0f64, 0f64, 0);
+    let (mut meet, mut center, mut outside) = (0f64, 0f64, Faults::NONE);
     for i in 0..effort.pick(300, 30_000) {
         let scale = rng.magnitude(-3.0, 3.0);
         let pose = pose(&mut rng, 3.0 * scale);
@@ -82,10 +82,8 @@ fn k1_thin_lens(effort: Effort) -> Outcome {
             let ray = blurred.ray(film, SIZE, rng.pair(), 0.0);
             meet = meet.max((at_depth(&pose, &ray, lens.focus_distance) - focus).length() / unit);
             let on_lens = pose.inverse().transform_point3(ray.origin.as_dvec3());
-            outside += usize::from(
-                on_lens.length()
-                    > lens.radius * (1.0 + 4.0 * UNIT_ROUNDOFF) + 2.0 * UNIT_ROUNDOFF * pose.translation.length(),
-            );
+            let reach = lens.radius * (1.0 + 4.0 * UNIT_ROUNDOFF) + 2.0 * UNIT_ROUNDOFF * pose.translation.length();
+            outside.require(on_lens.length() <= reach, || format!("{pose:?}, {lens:?}: {ray:?}"));
         }
         if blades.is_none() {
             let middle = blurred.ray(film, SIZE, [0.5; 2], 0.0);
@@ -265,7 +263,7 @@ fn exact_coverage(column: usize, shutter: [f64; 2]) -> f64 {
 fn k4_shutter(effort: Effort) -> Outcome {
     let spp = effort.pick(256, 4_096);
     let samples = (ROWS as u32 * spp) as f64;
-    let (mut least, mut impossible, mut tests) = (1f64, 0, 0);
+    let (mut least, mut impossible, mut tests) = (1f64, Faults::NONE, 0);
     let mut evidence = (Vec::new(), Vec::new());
     for shutter in [[0.0, 1.0], [0.25, 0.5], [0.9, 1.0]] {
         for camera_moves in [false, true] {
@@ -276,10 +274,12 @@ fn k4_shutter(effort: Effort) -> Outcome {
             }
             let expected: Vec<f64> = (0..COLUMNS).map(|column| exact_coverage(column, shutter)).collect();
             let (mut statistic, mut freedom) = (0.0, 0.0);
-            for (found, expected) in covered.iter().zip(&expected) {
+            for (column, (found, expected)) in covered.iter().zip(&expected).enumerate() {
                 let variance = expected * (1.0 - expected) / samples;
                 if samples * expected.min(1.0 - expected) < 8.0 {
-                    impossible += usize::from((found - expected).abs() * samples > 40.0);
+                    impossible.require((found - expected).abs() * samples <= 40.0, || {
+                        format!("shutter {shutter:?}, column {column}: {found} in place of {expected}")
+                    });
                 } else {
                     statistic += (found - expected).powi(2) / variance;
                     freedom += 1.0;

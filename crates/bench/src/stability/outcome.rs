@@ -57,6 +57,9 @@ pub struct Faults {
 }
 
 impl Faults {
+    /// No fault yet.
+    pub const NONE: Self = Self { count: 0, first: None };
+
     /// Counts the faults of each item in parallel.
     pub fn of<T: Sync>(items: &[T], faults: impl Fn(&T) -> usize + Sync, describe: impl FnOnce(&T) -> String) -> Self {
         let count = items.par_iter().map(&faults).sum();
@@ -64,12 +67,17 @@ impl Faults {
         Self { count, first }
     }
 
-    /// Counts one fault unless `holds`.
-    pub fn require(&mut self, holds: bool, describe: impl FnOnce() -> String) {
-        if !holds {
-            self.count += 1;
+    /// Counts the faults of one case.
+    pub fn add(&mut self, faults: usize, describe: impl FnOnce() -> String) {
+        if faults > 0 {
+            self.count += faults;
             self.first.get_or_insert_with(describe);
         }
+    }
+
+    /// Counts one fault unless `holds`.
+    pub fn require(&mut self, holds: bool, describe: impl FnOnce() -> String) {
+        self.add(usize::from(!holds), describe);
     }
 }
 
@@ -238,6 +246,20 @@ mod tests {
         assert_eq!(good.status(), Status::Passed);
         assert_eq!(good.clone().short("rounding").status(), Status::Short);
         assert_eq!(good.short("rounding").within("share", 1.1, 0.0, 1.0).status(), Status::Failed);
+    }
+
+    #[test]
+    fn the_first_fault_is_the_counterexample() {
+        let mut faults = Faults::default();
+        for ray in [1, 7, 9] {
+            faults.require(ray != 7, || format!("ray {ray}"));
+            faults.add(usize::from(ray > 7) * 2, || format!("ray {ray}"));
+        }
+        let mut all = Faults::from(1);
+        all += faults;
+        let outcome = Outcome::new().none("wrong", all);
+        assert_eq!((outcome.measures[0].value, outcome.measures[0].counterexample.as_deref()), (4.0, Some("ray 7")));
+        assert_eq!(Outcome::new().none("wrong", Faults::default()).measures[0].counterexample, None);
     }
 
     #[test]

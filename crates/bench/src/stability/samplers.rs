@@ -5,7 +5,8 @@ use std::f64::consts::FRAC_PI_4;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use super::{Effort, Outcome, Plot, sidak_level};
+use super::verdict::Tests;
+use super::{Effort, Faults, Outcome, Plot, sidak_level};
 use crate::sampling::{PixelSeed, Sampler, SamplerKind};
 use crate::stability::statistics::chi_squared_p_value;
 
@@ -52,17 +53,22 @@ fn uneven<T>(points: &[T], cell: impl Fn(&T) -> usize) -> usize {
 
 fn s1_elementary_intervals(effort: Effort) -> Outcome {
     let sampler = Sampler::new(SamplerKind::Sobol, 1);
-    let (mut single, mut pairs) = (0, 0);
+    let (mut single, mut pairs) = (Faults::NONE, Faults::NONE);
     for case in 0..effort.pick(6, 400u32) {
         let (pixel, set) = (sampler.pixel(case, 7 * case), [0, 3, 40, 1000][case as usize % 4]);
         for k in 2..=10u32 {
             // Also blocks that begin later, beyond the 16 bits of common tables too.
             for start in [0, 5 << k, 1 << 16, 3 << 20] {
                 let points: Vec<_> = (start..start + (1 << k)).map(|i| sampler.sample_4d(pixel, i, set)).collect();
-                single += (0..4).map(|dimension| uneven(&points, |p| digits(p[dimension], k))).sum::<usize>();
-                pairs += (0..=k)
-                    .map(|a| uneven(&points, |p| digits(p[0], a) << (k - a) | digits(p[1], k - a)))
-                    .sum::<usize>();
+                let block = format!("pixel ({case}, {}), set {set}, 2^{k} samples from {start}", 7 * case);
+                for dimension in 0..4 {
+                    let uneven = uneven(&points, |p| digits(p[dimension], k));
+                    single.add(uneven, || format!("{block}, dimension {dimension}"));
+                }
+                for a in 0..=k {
+                    let uneven = uneven(&points, |p| digits(p[0], a) << (k - a) | digits(p[1], k - a));
+                    pairs.add(uneven, || format!("{block}, 2^{a} by 2^{} cells", k - a));
+                }
             }
         }
     }
@@ -72,7 +78,7 @@ fn s1_elementary_intervals(effort: Effort) -> Outcome {
 }
 
 fn s2_any_order(effort: Effort) -> Outcome {
-    let (mut differ, mut alike) = (0, 0);
+    let (mut differ, mut alike) = (Faults::NONE, Faults::NONE);
     for kind in KINDS {
         for case in 0..effort.pick(20, 2_000u32) {
             let sampler = Sampler::new(kind, u64::from(case));
@@ -80,11 +86,15 @@ fn s2_any_order(effort: Effort) -> Outcome {
             let forward: Vec<_> = (0..256).map(|i| sampler.sample_4d(pixel, i % 16, i / 16)).collect();
             for i in (0..256).rev() {
                 let again = Sampler::new(kind, u64::from(case));
-                differ +=
-                    usize::from(again.sample_4d(again.pixel(10 + case, 20), i % 16, i / 16) != forward[i as usize]);
+                let found = again.sample_4d(again.pixel(10 + case, 20), i % 16, i / 16);
+                differ.require(found == forward[i as usize], || {
+                    format!("{kind:?}, seed {case}, sample {} of set {}: {found:?}", i % 16, i / 16)
+                });
             }
             let others = [Sampler::new(kind, u64::from(case) + 1).pixel(10 + case, 20), sampler.pixel(20, 10 + case)];
-            alike += others.iter().filter(|&&other| other == pixel && case != 10).count();
+            alike.add(others.iter().filter(|&&other| other == pixel && case != 10).count(), || {
+                format!("{kind:?}, seed {case}, pixel ({}, 20)", 10 + case)
+            });
         }
     }
     Outcome::new().none("samples that differ", differ).none("other seeds or pixels with the same scramble", alike)
@@ -131,7 +141,7 @@ const PAIRS: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 fn s4_uniformity(effort: Effort) -> Outcome {
     let sets: Vec<u32> = [0, 1, 63, 64, 1000].into_iter().chain(0..effort.pick(0, 40)).collect();
     let sobol = Sampler::new(SamplerKind::Sobol, 3);
-    let mut uneven = 0;
+    let mut uneven = Faults::NONE;
     for &set in &sets {
         let (mut bins, mut squares) = ([[0u32; 16]; 4], [0u32; 256]);
         for i in 0..1024 {
@@ -139,34 +149,30 @@ fn s4_uniformity(effort: Effort) -> Outcome {
             (0..4).for_each(|d| bins[d][digits(u[d], 4)] += 1);
             squares[cell(u[0], u[1])] += 1;
         }
-        uneven +=
-            bins.as_flattened().iter().filter(|&&n| n != 64).count() + squares.iter().filter(|&&n| n != 4).count();
+        uneven.add(
+            bins.as_flattened().iter().filter(|&&n| n != 64).count() + squares.iter().filter(|&&n| n != 4).count(),
+            || format!("set {set}: {bins:?}"),
+        );
     }
     let independent = Sampler::new(SamplerKind::Independent, 3);
-    let mut p_values = Vec::new();
+    let mut tests = Tests::new();
     for &set in &sets {
         let pixel = independent.pixel(5, 6);
         for [a, b] in PAIRS {
             let points = (0..effort.pick(20_000, 200_000)).map(|i| independent.sample_4d(pixel, i, set));
-            p_values.push(p_uniform(points.map(|u| [u[a], u[b]])));
+            tests.add(&format!("set {set}, dimensions {a} and {b}"), p_uniform(points.map(|u| [u[a], u[b]])));
         }
     }
     for kind in KINDS {
         let sampler = Sampler::new(kind, 11);
         for [a, b] in PAIRS {
-            p_values.push(p_uniform(
-                (0..65_536).map(|i| sampler.sample_4d(sampler.pixel(i & 255, i >> 8), 0, 0)).map(|u| [u[a], u[b]]),
-            ));
-            p_values.push(p_uniform(
-                (0..65_536).map(|i| sampler.sample_4d(sampler.pixel(0, 0), 1, i)).map(|u| [u[a], u[b]]),
-            ));
+            let pixels = (0..65_536).map(|i| sampler.sample_4d(sampler.pixel(i & 255, i >> 8), 0, 0));
+            tests.add(&format!("{kind:?}, pixels, dimensions {a} and {b}"), p_uniform(pixels.map(|u| [u[a], u[b]])));
+            let sets = (0..65_536).map(|i| sampler.sample_4d(sampler.pixel(0, 0), 1, i));
+            tests.add(&format!("{kind:?}, sets, dimensions {a} and {b}"), p_uniform(sets.map(|u| [u[a], u[b]])));
         }
     }
-    Outcome::new().none("Sobol: bins with another count than their share", uneven).at_least(
-        format!("smallest p-value of {}", p_values.len()),
-        p_values.iter().copied().fold(1.0, f64::min),
-        sidak_level(p_values.len()),
-    )
+    tests.judge(Outcome::new().none("Sobol: bins with another count than their share", uneven))
 }
 
 fn s5_scrambles(effort: Effort) -> Outcome {
@@ -181,28 +187,22 @@ fn s5_scrambles(effort: Effort) -> Outcome {
     let first = |x: u32, y: u32, set: u32| sampler.sample_4d(sampler.pixel(x, y), 0, set);
     let steps: [(u32, u32, u32); 6] = [(1, 0, 0), (0, 1, 0), (1, 1, 0), (16, 16, 0), (0, 0, 1), (0, 0, 2)];
     let rows = effort.pick(256, 1024u32);
-    let mut p_values = Vec::new();
+    let mut tests = Tests::new();
     for (dx, dy, ds) in steps {
         for dimension in 0..4 {
             let points = (0..256 * rows).map(|i| {
                 let (x, y) = (i & 255, i >> 8);
                 [first(x, y, 5)[dimension], first(x + dx, y + dy, 5 + ds)[dimension]]
             });
-            p_values.push(p_uniform(points));
+            tests.add(&format!("first samples {dx}, {dy} and {ds} apart, dimension {dimension}"), p_uniform(points));
         }
     }
     // A Poisson number of that mean exceeds the bound once in a million.
-    Outcome::new()
-        .at_most(
-            format!("pixels of {side} x {side} with the scramble of another"),
-            equal,
-            expected + 5.0 * expected.sqrt() + 6.0,
-        )
-        .at_least(
-            format!("smallest p-value of {} pairs of first samples", p_values.len()),
-            p_values.iter().copied().fold(1.0, f64::min),
-            sidak_level(p_values.len()),
-        )
+    tests.judge(Outcome::new().at_most(
+        format!("pixels of {side} x {side} with the scramble of another"),
+        equal,
+        expected + 5.0 * expected.sqrt() + 6.0,
+    ))
 }
 
 /// Four dimensions of a pixel's samples.
@@ -342,27 +342,23 @@ fn mean_over_pixels(sampler: Sampler, integrand: &Integrand, samples: u32, pixel
 
 fn s8_seeds_and_counts(effort: Effort) -> Outcome {
     let pixels = effort.pick(4_096, 1 << 17);
-    let normal = Normal::standard();
-    let mut p_values = Vec::new();
+    let mut tests = Tests::new();
     let mut relative = 0f64;
     for integrand in integrands() {
         for kind in KINDS {
             for samples in [1, 3, 7, 24, 100] {
                 let [a, b] = [1, 2].map(|seed| mean_over_pixels(Sampler::new(kind, seed), &integrand, samples, pixels));
-                for (difference, variance) in
-                    [(a.0 - integrand.exact, a.1), (b.0 - integrand.exact, b.1), (a.0 - b.0, a.1 + b.1)]
-                {
-                    p_values.push(2.0 * normal.sf((difference / variance.sqrt()).abs()));
+                for (what, difference, variance) in [
+                    ("seed 1", a.0 - integrand.exact, a.1),
+                    ("seed 2", b.0 - integrand.exact, b.1),
+                    ("both", a.0 - b.0, a.1 + b.1),
+                ] {
+                    let name = format!("{}, {kind:?}, {samples} samples, {what}", integrand.name);
+                    tests.deviations(&name, difference / variance.sqrt());
                 }
                 relative = relative.max((a.0 / integrand.exact - 1.0).abs());
             }
         }
     }
-    Outcome::new()
-        .at_least(
-            format!("smallest p-value of {}", p_values.len()),
-            p_values.iter().copied().fold(1.0, f64::min),
-            sidak_level(p_values.len()),
-        )
-        .record("largest relative error of a mean", relative)
+    tests.judge(Outcome::new()).record("largest relative error of a mean", relative)
 }

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::geometry::{
     Rng, closest, cube, grid, instances, mesh, meshes, ray, ray_through, sphere_mesh, transform, triangle, world,
 };
-use super::{Effort, Outcome};
+use super::{Effort, Faults, Outcome};
 use crate::accel::{self, AccelKind, Accelerator, LinearAccel};
 use crate::geometry::{Analytic, Geometry, Mesh, MeshStep, Quad, Shape, SurfaceInteraction, TransformedShape};
 use crate::id::PrimId;
@@ -71,7 +71,7 @@ fn embree(geometry: &Geometry) -> Box<dyn Accelerator + '_> {
 #[derive(Default)]
 struct Tally {
     rays: usize,
-    lost: Vec<(&'static str, usize)>,
+    lost: Vec<(&'static str, Faults)>,
 }
 
 impl Tally {
@@ -81,10 +81,8 @@ impl Tally {
         self.rays += rays.len();
         for (name, accel) in accels {
             let rays = if *name == "linear" { &rays[..rays.len() / 8] } else { rays };
-            let lost: usize = rays
-                .iter()
-                .map(|ray| usize::from(accel.intersect(ray).is_none()) + usize::from(!accel.occluded(ray)))
-                .sum();
+            let is_lost = |ray: &Ray| usize::from(accel.intersect(ray).is_none()) + usize::from(!accel.occluded(ray));
+            let lost = Faults::of(rays, is_lost, |ray| format!("{ray:?}"));
             match self.lost.iter_mut().find(|(known, _)| known == name) {
                 Some((_, sum)) => *sum += lost,
                 None => self.lost.push((name, lost)),
@@ -104,7 +102,7 @@ impl Tally {
 
 /// The errors of hits of the unit triangle or square in the plane z = 0 by rays from one unit away.
 struct HitErrors {
-    missed: usize,
+    missed: Faults,
     parameters: f64,
     place: f64,
     normal: f64,
@@ -112,13 +110,13 @@ struct HitErrors {
 
 fn hit_errors(geometry: &Geometry, mut target: impl FnMut() -> DVec3, count: usize) -> HitErrors {
     let (embree, linear) = (embree(geometry), LinearAccel::new(geometry));
-    let mut errors = HitErrors { missed: 0, parameters: 0.0, place: 0.0, normal: 0.0 };
+    let mut errors = HitErrors { missed: Faults::NONE, parameters: 0.0, place: 0.0, normal: 0.0 };
     for _ in 0..count {
         let target = target();
         let ray = ray_through(-DVec3::Z, target);
         for accel in [&*embree, &linear] {
             let Some(si) = accel.intersect(&ray).and_then(|hit| geometry.interaction(&ray, &hit)) else {
-                errors.missed += 1;
+                errors.missed.require(false, || format!("{ray:?}"));
                 continue;
             };
             let parameters = [f64::from(si.uv.x) - target.x, f64::from(si.uv.y) - target.y, f64::from(si.t) - 1.0];
@@ -131,7 +129,7 @@ fn hit_errors(geometry: &Geometry, mut target: impl FnMut() -> DVec3, count: usi
 }
 
 impl HitErrors {
-    fn report(&self) -> Outcome {
+    fn report(self) -> Outcome {
         // 16 units in the last place of one.
         const BOUND: f64 = 16.0 * f32::EPSILON as f64;
         Outcome::new()
@@ -237,7 +235,7 @@ fn a5_vertices(effort: Effort) -> Outcome {
     let queries = 2.0 * rays.len() as f64;
     tally.lost.into_iter().fold(Outcome::new(), |outcome, (name, lost)| {
         if name == "embree" {
-            outcome.at_most("fraction lost by embree", lost as f64 / queries, 0.03)
+            outcome.at_most("fraction lost by embree", lost.count as f64 / queries, 0.03).shown_by(&lost)
         } else {
             outcome.none(format!("lost by {name}"), lost)
         }
@@ -274,7 +272,8 @@ fn a7_small_far_triangles(effort: Effort) -> Outcome {
     let plane = grid(-0.5 * (x + y), x, y, 100, |_, _| 0.0);
     let geometry = meshes(vec![plane.clone()]);
     let accels: Vec<Named> = accelerators(&geometry);
-    let (mut rays, mut missed, mut missed_by_embree, mut wrong, mut other, mut off) = (0, 0usize, 0usize, 0, 0, 0f64);
+    let (mut rays, mut other, mut off) = (0, 0, 0f64);
+    let [mut missed, mut missed_by_embree, mut wrong] = [const { Faults::NONE }; 3];
     for _ in 0..effort.pick(4_000, 1_000_000) {
         let prim = rng.below(plane.triangles().len());
         let [a, b, c] = corners(&plane, prim);
@@ -291,7 +290,8 @@ fn a7_small_far_triangles(effort: Effort) -> Outcome {
         let p = origin + direction * (n.dot(a - origin) / n.dot(direction));
         for (name, accel) in &accels {
             let Some(found) = accel.intersect(&ray).map(|hit| hit.prim.index()) else {
-                *(if *name == "embree" { &mut missed_by_embree } else { &mut missed }) += 1;
+                let missed = if *name == "embree" { &mut missed_by_embree } else { &mut missed };
+                missed.require(false, || format!("{name}: {ray:?}"));
                 continue;
             };
             // On the way into the plane the distance from the ray grows by the inverse sine.
@@ -300,8 +300,9 @@ fn a7_small_far_triangles(effort: Effort) -> Outcome {
                 other += usize::from(found != prim);
                 off = off.max(beside);
             } else {
-                wrong += usize::from(outside(corners(&plane, prim), n, p) < -1e-4 && found != prim);
-                wrong += usize::from(beside * UNIT_ROUNDOFF > 1e-9);
+                let describe = || format!("{name}: {ray:?} hits triangle {found} in place of {prim}");
+                wrong.require(found == prim || outside(corners(&plane, prim), n, p) >= -1e-4, describe);
+                wrong.require(beside * UNIT_ROUNDOFF <= 1e-9, describe);
             }
         }
     }
@@ -310,7 +311,8 @@ fn a7_small_far_triangles(effort: Effort) -> Outcome {
         .none("missed by other accelerators", missed)
         // At 1e6 corners less the origin lie on a grid of 1/16, so that some rays meet corners exactly, of which Embree
         // loses a few (A5).
-        .at_most("fraction missed by Embree", missed_by_embree as f64 / f64::from(rays), 2e-5)
+        .at_most("fraction missed by Embree", missed_by_embree.count as f64 / f64::from(rays), 2e-5)
+        .shown_by(&missed_by_embree)
         .none("other triangles than the ray meets, other accelerators", wrong)
         // Corners less the origin have one unit of roundoff, the edge functions made of them up to seven more.
         .at_most("embree: distance of the ray from the triangle found, units of roundoff of the origin", off, 8.0)
@@ -380,16 +382,19 @@ fn a9_bad_cases(_: Effort) -> Outcome {
     let line =
         [[-1113.4546, -79.049614, -56.24319], [-1113.4546, -79.049614, -56.24319], [-1113.4547, -79.04961, -56.24319]];
     let along = Ray::new(Vec3::ZERO, Vec3::new(-1_113.454_6, -79.049_61, -56.243_19));
-    let (mut hits, mut not_finite) = (0, 0);
+    let (mut hits, mut not_finite) = (Faults::NONE, Faults::NONE);
     for (corners, ray) in [(collinear, across), (line, along)] {
         let [a, b, c] = corners.map(DVec3::from_array);
         let mesh = triangle(a, b, c);
         let sample = mesh.triangle_points(PrimId(0)).sample([0.3, 0.4]);
-        not_finite +=
-            usize::from(sample.is_some_and(|s| !(s.p.is_finite() && s.n.is_finite() && s.pdf_area.is_finite())));
+        let is_finite = sample.is_none_or(|s| s.p.is_finite() && s.n.is_finite() && s.pdf_area.is_finite());
+        not_finite.require(is_finite, || format!("{corners:?}: {sample:?}"));
         let geometry = meshes(vec![mesh]);
-        for (_, accel) in accelerators(&geometry) {
-            hits += usize::from(accel.intersect(&ray).is_some()) + usize::from(accel.occluded(&ray));
+        for (name, accel) in accelerators(&geometry) {
+            let (hit, occluded) = (accel.intersect(&ray), accel.occluded(&ray));
+            hits.add(usize::from(hit.is_some()) + usize::from(occluded), || {
+                format!("{name}: {ray:?} has {hit:?} (occluded: {occluded})")
+            });
         }
     }
     Outcome::new().none("hits", hits).none("samples that are not finite", not_finite)
@@ -397,7 +402,7 @@ fn a9_bad_cases(_: Effort) -> Outcome {
 
 fn a10_both_sides(effort: Effort) -> Outcome {
     let mut rng = Rng::new(10);
-    let (mut missed, mut wrong_side) = (0, 0);
+    let (mut missed, mut wrong_side) = (Faults::NONE, Faults::NONE);
     let mirror =
         transform(DMat3::from_diagonal(DVec3::new(-1.5, 0.8, 1.2)) * rng.rotation(), DVec3::new(3.0, 1.0, -2.0));
     let (a, b, c) = (rng.cube(), rng.cube(), rng.cube());
@@ -412,21 +417,24 @@ fn a10_both_sides(effort: Effort) -> Outcome {
             let target = placement.point(a * u + b * v + c * w);
             let side = if i % 2 == 0 { front } else { -front };
             let ray = ray_through(target + rng.direction_around(side) + 0.1 * side, target);
-            for (_, accel) in &accels {
+            for (name, accel) in &accels {
                 let found: Option<SurfaceInteraction> = closest(&**accel, &geometry, &ray).found;
-                missed += usize::from(found.is_none()) + usize::from(!accel.occluded(&ray));
-                wrong_side +=
-                    usize::from(found.is_some_and(|si| si.n_g.dot(ray.direction) * side.dot(front) as f32 >= 0.0));
+                let describe = || format!("{name}: {ray:?} has the normal {:?}", found.map(|si| si.n_g));
+                missed.add(usize::from(found.is_none()) + usize::from(!accel.occluded(&ray)), describe);
+                let is_right = found.is_none_or(|si| si.n_g.dot(ray.direction) * (side.dot(front) as f32) < 0.0);
+                wrong_side.require(is_right, describe);
             }
         }
     }
     // A closed body of such triangles has its fronts outside.
     let geometry = meshes(vec![cube(rng.rotation(), DVec3::ZERO)]);
-    for (_, accel) in accelerators(&geometry) {
+    for (name, accel) in accelerators(&geometry) {
         for _ in 0..effort.pick(200, 20_000) {
             let ray = ray(0.5 * rng.cube(), rng.direction());
-            wrong_side +=
-                usize::from(closest(&*accel, &geometry, &ray).found.is_none_or(|si| si.n_g.dot(ray.direction) <= 0.0));
+            let found = closest(&*accel, &geometry, &ray).found;
+            wrong_side.require(found.is_some_and(|si| si.n_g.dot(ray.direction) > 0.0), || {
+                format!("{name}: {ray:?} from within a cube has the normal {:?}", found.map(|si| si.n_g))
+            });
         }
     }
     Outcome::new().none("missed", missed).none("normals on the wrong side", wrong_side)

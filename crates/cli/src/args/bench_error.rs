@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use steradian::desc::{IntegratorDesc, SamplerKindDesc, StrategyDesc};
 use steradian::internal::accel::AccelKind;
+use steradian_bench::error::Peer;
 
 use super::import::ImportArgs;
 use super::{accel_help, parse_size};
@@ -29,8 +30,9 @@ Examples:
 {out} {scene}'
       Beside another program. {scene} and {out} come quoted for the shell; {seed} is there too, and {seconds} with \
 --times. Its time is what it
-      prints as JSON, as {\"render_seconds\": 1.5} or {\"runs\": [{\"render_s\": [1.5]}]}, else that of its whole \
-process.
+      prints as JSON, as {\"render_seconds\": 1.5, \"processor_seconds\": 2.9}, else that of its whole process.
+  steradian bench error scene.xml --reference scene.exr --peers --peer cycles=scene.blend --out report
+      Beside Mitsuba, if it is installed, and Cycles, through their Python modules: time to equal error on one page.
   steradian bench error cornell.json --reference cornell.exr --spp 16 --tax
       How much of the time is tracing: the render's own rays, traced by bare calls of Embree.
 
@@ -101,9 +103,22 @@ pub struct BenchErrorArgs {
     /// Another program, by a command that writes {out}; repeat for several
     #[arg(long, value_name = "NAME=COMMAND", value_parser = parse_external, help_heading = "Variants")]
     pub external: Vec<(String, String)>,
-    /// Only the programs of --external
-    #[arg(long, requires = "external", requires = "reference", help_heading = "Variants")]
+    /// Only other programs: those of --external, --peer and --peers
+    #[arg(long, requires = "reference", help_heading = "Variants")]
     pub only_external: bool,
+    /// Another renderer: mitsuba, cycles or luxcore; repeat for several
+    ///
+    /// It runs through its Python module (`pip install mitsuba`, `bpy` or `pyluxcore`) on FILE, its own form of the
+    /// scene: mitsuba reads .xml, cycles .blend, .gltf and .glb, luxcore .cfg. FILE defaults to the scene. Times are
+    /// those of the render alone, without loading and compiling.
+    #[arg(long = "peer", value_name = "NAME[=FILE]", value_parser = parse_peer, help_heading = "Variants")]
+    pub peers: Vec<(Peer, Option<PathBuf>)>,
+    /// Every renderer of --peer that is installed and reads the scene
+    #[arg(long = "peers", help_heading = "Variants")]
+    pub all_peers: bool,
+    /// The Python interpreter that has their modules
+    #[arg(long, value_name = "PROGRAM", default_value = "python3", help_heading = "Variants")]
+    pub python: PathBuf,
 
     /// Width and height in pixels, such as 1920x1080
     #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = "Render")]
@@ -137,6 +152,14 @@ pub struct BenchErrorArgs {
 fn parse_seconds(text: &str) -> Result<f64, String> {
     let seconds = text.trim().parse::<f64>().ok().filter(|seconds| (1e-3..=1e6).contains(seconds));
     seconds.ok_or_else(|| "expected seconds, from 0.001 to 1e6".to_owned())
+}
+
+fn parse_peer(text: &str) -> Result<(Peer, Option<PathBuf>), String> {
+    let (name, file) = text.split_once('=').map_or((text, None), |(name, file)| (name, Some(PathBuf::from(file))));
+    match Peer::ALL.into_iter().find(|peer| peer.name() == name.trim()) {
+        Some(peer) => Ok((peer, file)),
+        None => Err("expected mitsuba, cycles or luxcore, as NAME or NAME=FILE".to_owned()),
+    }
 }
 
 fn parse_external(text: &str) -> Result<(String, String), String> {

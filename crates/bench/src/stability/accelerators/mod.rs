@@ -42,8 +42,8 @@ checks! {
         "random keyframed motions, and their products, of points in a box, deforming triangles (pbrt-v4, \
          AnimatedTransform.Randoms)";
     "F9" f9_visits "nodes and primitives visited":
-        "bumpy sphere of 70,000 triangles; at most 40 in hierarchies and 64 in trees by camera rays; recorded figures \
-         hold within 10 %, so that a loss is noticed";
+        "bumpy sphere of 70,000 triangles, alone and on a large floor; at most 15 to 160 by camera rays and 40 to 320 \
+         by bounce rays; recorded figures hold within 10 %, so that a loss is noticed";
 }
 
 /// How many of `items` have a property, tried in parallel.
@@ -172,13 +172,15 @@ fn f2_ties(_: Effort) -> Outcome {
         mesh.triangles().iter().position(touches)
     };
     let expected: Vec<_> = points.iter().map(|&p| (ray(p + DVec3::Z, -DVec3::Z), first(p))).collect();
-    let mut wrong = 0;
-    for (_, accel) in own(&geometry) {
+    let mut wrong = Faults::NONE;
+    for (name, accel) in own(&geometry) {
         let is_first = |hit: Hit, first: &Option<usize>| hit.shape == ShapeId(0) && Some(hit.prim.index()) == *first;
-        wrong += expected
-            .iter()
-            .filter(|(ray, first)| !accel.intersect(ray).is_some_and(|hit| is_first(hit, first)))
-            .count();
+        for (ray, first) in &expected {
+            let found = accel.intersect(ray);
+            wrong.require(found.is_some_and(|hit| is_first(hit, first)), || {
+                format!("{name}: {ray:?} has {found:?}, the first is triangle {first:?}")
+            });
+        }
     }
     // Embree may take any of them; through corners it loses some rays (A5).
     let embree = build(AccelKind::EMBREE, &geometry);

@@ -5,7 +5,7 @@ use crate::id::{ObjectId, PrimId};
 use crate::math::{Aabb, Bounds, DVec3};
 use crate::stability::geometry::Rng;
 use crate::stability::scenes::{deforming, motion};
-use crate::stability::{Effort, Outcome};
+use crate::stability::{Effort, Faults, Outcome};
 
 fn holds(bounds: &Aabb, p: DVec3) -> bool {
     bounds.min.as_dvec3().cmple(p).all() && p.cmple(bounds.max.as_dvec3()).all()
@@ -14,7 +14,7 @@ fn holds(bounds: &Aabb, p: DVec3) -> bool {
 pub(super) fn f8_motion_bounds(effort: Effort) -> Outcome {
     const TIMES: usize = 200;
     let mut rng = Rng::new(38);
-    let (mut pairs, mut outside, mut looseness) = (0, 0, Vec::new());
+    let (mut pairs, mut outside, mut looseness) = (0, Faults::NONE, Vec::new());
     for _ in 0..effort.pick(100, 4_000) {
         let (p, q) = (rng.cube(), rng.cube());
         let object = Bounds::EMPTY.extended(p).extended(q).padded();
@@ -25,20 +25,22 @@ pub(super) fn f8_motion_bounds(effort: Effort) -> Outcome {
             let time = if i < 2 { i as f32 } else { rng.unit_f32() };
             let corner = DVec3::new([p.x, q.x][rng.below(2)], [p.y, q.y][rng.below(2)], [p.z, q.z][rng.below(2)]);
             let there = instance.transform_at(time).point(corner);
-            outside += usize::from(!holds(&bounds, there));
+            outside.require(holds(&bounds, there), || format!("{instance:?}: {corner} at {time}"));
             reached = reached.extended(there);
             pairs += 1;
         }
         looseness.push(f64::from(bounds.area()) / f64::from(reached.padded().area()));
     }
-    let mut crossed = 0;
+    let mut crossed = Faults::NONE;
     for _ in 0..effort.pick(10, 100) {
         let mesh = deforming(&mut rng, 20);
         let shape = Shape::Mesh(mesh.clone());
         for _ in 0..1_000 {
             let (prim, time) = (PrimId::new(rng.below(20)), rng.unit_f32());
             let (points, bounds) = (mesh.triangle_points_at(prim, time), shape.prim_bounds(prim));
-            crossed += [points.a, points.b, points.c].iter().filter(|p| !bounds.contains(**p)).count();
+            crossed.add([points.a, points.b, points.c].iter().filter(|p| !bounds.contains(**p)).count(), || {
+                format!("{points:?} at {time} in {bounds:?}")
+            });
             pairs += 1;
         }
     }

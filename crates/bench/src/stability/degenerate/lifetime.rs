@@ -1,8 +1,6 @@
 //! Scenes of no, one and many shapes, one after the other and side by side.
 
-use rayon::prelude::*;
-
-use super::{Effort, Outcome};
+use super::{Effort, Faults, Outcome};
 use crate::accel::{AccelKind, Accelerator, EmbreeAccel, EmbreeOptions, EmbreeQuality, LinearAccel};
 use crate::bumpy_sphere;
 use crate::geometry::{Geometry, Shape, TransformedShape};
@@ -12,8 +10,8 @@ use crate::stability::geometry::{
 };
 use crate::stability::scenes::{all, all_answers, build, moving_scene, same, scenes, test_rays};
 
-/// How many answers of any accelerator are not the oracle's.
-fn differing(geometry: &Geometry, rays: &[Ray]) -> usize {
+/// The answers of any accelerator that are not the oracle's.
+fn differing(geometry: &Geometry, rays: &[Ray]) -> Faults {
     let oracle = LinearAccel::new(geometry);
     let expected: Vec<_> = rays.iter().map(|ray| oracle.intersect(ray)).collect();
     let is_same = |ray: &Ray, found, expected| match (found, expected) {
@@ -21,10 +19,16 @@ fn differing(geometry: &Geometry, rays: &[Ray]) -> usize {
         (None, None) => true,
         _ => false,
     };
-    let wrong = |accel: &dyn Accelerator| {
-        rays.iter().zip(&expected).filter(|(ray, expected)| !is_same(ray, accel.intersect(ray), **expected)).count()
-    };
-    all(geometry).iter().map(|(_, accel)| wrong(&**accel)).sum()
+    let mut wrong = Faults::NONE;
+    for (name, accel) in all(geometry) {
+        for (ray, expected) in rays.iter().zip(&expected) {
+            let found = accel.intersect(ray);
+            wrong.require(is_same(ray, found, *expected), || {
+                format!("{name}: {ray:?} has {found:?} in place of {expected:?}")
+            });
+        }
+    }
+    wrong
 }
 
 /// Hits in scenes without a shape.
@@ -52,18 +56,21 @@ fn single_shapes() -> Vec<Geometry> {
 }
 
 /// Rays from inside of a closed mesh that leave it.
-fn leaks(effort: Effort, rng: &mut Rng) -> usize {
+fn leaks(effort: Effort, rng: &mut Rng) -> Faults {
     let geometry = meshes(vec![bumpy_sphere(effort.pick(20_000, 1_000_000))]);
     let rays: Vec<Ray> = (0..effort.pick(2_000, 100_000)).map(|_| ray(0.5 * rng.cube(), rng.direction())).collect();
     let kinds = AccelKind::ALL.into_iter().filter(|(kind, _)| *kind != AccelKind::Linear);
-    let lost = |accel: &dyn Accelerator| {
-        rays.par_iter().filter(|ray| accel.intersect(ray).is_none() || !accel.occluded(ray)).count()
-    };
-    kinds.map(|(kind, _)| lost(&*build(kind, &geometry))).sum()
+    let mut leaks = Faults::NONE;
+    for (kind, name) in kinds {
+        let accel = build(kind, &geometry);
+        let is_lost = |ray: &Ray| usize::from(accel.intersect(ray).is_none() || !accel.occluded(ray));
+        leaks += Faults::of(&rays, is_lost, |ray| format!("{name}: {ray:?}"));
+    }
+    leaks
 }
 
 /// Hits of three accelerators, traced in turn, that differ from those of each alone.
-fn disturbed(rng: &mut Rng) -> usize {
+fn disturbed(rng: &mut Rng) -> Faults {
     let geometries = [10, 100, 300].map(|count| meshes(vec![soup(rng, count, 0.4)]));
     let rays = test_rays(rng, &geometries[0], 1_000);
     let alone = geometries
@@ -73,18 +80,19 @@ fn disturbed(rng: &mut Rng) -> usize {
     let differing = |(i, ray): (usize, &Ray)| {
         (0..3).filter(|&k| alone[k].get(i).is_some_and(|hit| *hit != together[k].intersect(ray))).count()
     };
-    rays.iter().enumerate().map(differing).sum()
+    let numbered: Vec<_> = rays.iter().enumerate().collect();
+    Faults::of(&numbered, |case| differing(*case), |(_, ray)| format!("{ray:?}"))
 }
 
 pub(super) fn e8_life_of_scenes(effort: Effort) -> Outcome {
     let mut rng = Rng::new(81);
     let any_rays = test_rays(&mut rng, &Geometry::default(), 100);
-    let mut single = 0;
+    let mut single = Faults::NONE;
     for geometry in &single_shapes() {
         let rays = test_rays(&mut rng, geometry, effort.pick(400, 40_000));
         single += differing(geometry, &rays);
     }
-    let mut moved = 0;
+    let mut moved = Faults::NONE;
     let mut place = DVec3::ZERO;
     for _ in 0..16 {
         place += 3.0 * rng.cube();

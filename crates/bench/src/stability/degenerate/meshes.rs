@@ -1,6 +1,6 @@
 //! Meshes that are hardly any.
 
-use super::{Effort, Outcome};
+use super::{Effort, Faults, Outcome};
 use crate::accel::inspect::{StructureStats, TraversalCounts};
 use crate::accel::{AccelKind, Accelerator, LinearAccel};
 use crate::geometry::{Mesh, MeshError};
@@ -45,40 +45,48 @@ fn degenerate_before_proper() -> Vec<Mesh> {
 
 pub(super) fn e3_garbage_meshes(effort: Effort) -> Outcome {
     let mut rng = Rng::new(31);
-    let (mut accepted, mut refused, mut wrong, mut infinite, mut outside, mut endless) = (0, 0, 0, 0, 0, 0);
+    let (mut accepted, mut refused, mut endless) = (0, 0, 0);
+    let [mut wrong, mut infinite, mut outside] = [const { Faults::NONE }; 3];
     for _ in 0..effort.pick(40, 1_000) {
         // Exponents up to 187 are below 1.8e18; up to 255 they are infinities and NaNs too.
         let found: Vec<_> = (0..20).map(|i| garbage(&mut rng, if i % 2 == 0 { 187 } else { 255 })).collect();
         refused += found.iter().filter(|mesh| mesh.is_err()).count();
         let good: Vec<Mesh> = found.into_iter().flatten().collect();
         accepted += good.len();
-        wrong += good.iter().filter(|mesh| !is_valid(mesh)).count();
+        wrong += Faults::of(
+            &good,
+            |mesh| usize::from(!is_valid(mesh)),
+            |mesh| format!("{:?}, {:?}", mesh.positions(), mesh.triangles()),
+        );
         let geometry = meshes(good);
         let rays: Vec<Ray> = (0..32).map(|_| ray_through(rng.cube() * rng.magnitude(-3.0, 9.0), rng.cube())).collect();
         for (name, accel) in all(&geometry) {
-            infinite += usize::from(!is_finite(&accel.bounds()));
+            infinite.require(is_finite(&accel.bounds()), || format!("{name}: {:?}", accel.bounds()));
             for hit in all_answers(&*accel, &rays).iter().flat_map(|(hits, _)| hits.iter().flatten()) {
                 // Products of edges above 1e12 overflow in f32: Embree then finds hits at infinity.
                 let overflown = name == "embree" && hit.t == f32::INFINITY;
                 endless += usize::from(overflown);
-                outside += usize::from(!(overflown || (hit.t >= 0.0 && hit.t.is_finite())));
+                outside.require(overflown || (hit.t >= 0.0 && hit.t.is_finite()), || format!("{name}: {hit:?}"));
             }
         }
     }
 
     let geometry = meshes(degenerate_before_proper());
-    let (mut lost, mut disturbed, mut worst) = (0, 0, 0.0_f32);
+    let (mut lost, mut disturbed, mut worst) = (Faults::NONE, Faults::NONE, 0.0_f32);
     for (name, accel) in all(&geometry) {
         let tolerance = 2.0 * distance_error(name);
         worst = worst.max(tolerance);
         for i in 0..200 {
             let x = if i < 3 { [0.25, 0.2, 0.3][i] } else { rng.range(0.05, 0.45) };
-            match accel.intersect(&ray(DVec3::new(x, if i < 3 { 0.25 } else { x }, 1.0), -DVec3::Z)) {
-                None => lost += 1,
-                Some(hit) => disturbed += usize::from(hit.shape.0 != 3 || (hit.t - 2.0).abs() > tolerance),
-            }
+            let ray = ray(DVec3::new(x, if i < 3 { 0.25 } else { x }, 1.0), -DVec3::Z);
+            let found = accel.intersect(&ray);
+            let describe = || format!("{name}: {ray:?} has {found:?}");
+            lost.require(found.is_some(), describe);
+            disturbed.require(found.is_none_or(|hit| hit.shape.0 == 3 && (hit.t - 2.0).abs() <= tolerance), describe);
         }
-        infinite += usize::from(!is_finite(&accel.bounds()) || accel.bounds().is_empty());
+        infinite.require(is_finite(&accel.bounds()) && !accel.bounds().is_empty(), || {
+            format!("{name}: {:?}", accel.bounds())
+        });
     }
     let outcome = Outcome::new()
         .record("meshes of random bits accepted", accepted as f64)
@@ -100,10 +108,14 @@ pub(super) fn e4_identical_triangles(effort: Effort) -> Outcome {
     let center = (positions[0] + positions[1] + positions[2]) / 3.0;
     let ray = ray_through(center + DVec3::new(0.1, 0.2, 3.0), center);
     let first = |accel: &dyn Accelerator| accel.intersect(&ray).map(|hit| hit.prim.0);
-    let mut others = usize::from(first(&LinearAccel::new(&geometry)) != Some(0));
+    let mut others = Faults::NONE;
+    let mut judge = |name: &str, found: Option<u32>| {
+        others.require(found == Some(0), || format!("{name}: {ray:?} hits triangle {found:?}"));
+    };
+    judge("linear", first(&LinearAccel::new(&geometry)));
     let (mut depth, mut memory, mut work) = (0, 0, 0);
-    for (_, accel) in own(&geometry) {
-        others += usize::from(first(&*accel) != Some(0));
+    for (name, accel) in own(&geometry) {
+        judge(name, first(&*accel));
         memory = memory.max(accel.memory_bytes());
         let Some(inspect) = accel.inspect() else { continue };
         depth = depth.max(StructureStats::of(inspect).max_depth);
@@ -112,7 +124,9 @@ pub(super) fn e4_identical_triangles(effort: Effort) -> Outcome {
         work = work.max(counts.nodes + counts.prims);
     }
     let embree: Vec<_> = (0..3).map(|_| first(&*build(AccelKind::EMBREE, &geometry))).collect();
-    let unstable = embree.iter().filter(|found| found.is_none() || **found != embree[0]).count();
+    let is_first = |found: &Option<u32>| found.is_some() && *found == embree[0];
+    let unstable =
+        Faults::of(&embree, |found| usize::from(!is_first(found)), |_| format!("{ray:?} hits triangles {embree:?}"));
     Outcome::new()
         .record("triangles", count as f64)
         .none("accelerators other than Embree, with the oracle, that do not hit the first", others)

@@ -76,21 +76,33 @@ fn wild_ray(rng: &mut Rng) -> Ray {
     }
 }
 
-/// How many answers of any entry point are hits, of closest-hit and any-hit queries.
-fn hits(accel: &dyn Accelerator, rays: &[Ray]) -> usize {
-    let of = |(hits, occluded): (Vec<Option<_>>, Vec<bool>)| {
-        hits.iter().filter(|hit| hit.is_some()).count() + occluded.iter().filter(|found| **found).count()
-    };
-    all_answers(accel, rays).into_iter().map(of).sum()
+/// The answers of any entry point that are at fault: `faults` counts those of closest-hit and any-hit queries of a ray.
+fn faults_of(
+    name: &str,
+    accel: &dyn Accelerator,
+    rays: &[Ray],
+    faults: impl Fn(usize, Option<Hit>, bool) -> usize,
+) -> Faults {
+    let mut found = Faults::default();
+    for (hits, occluded) in all_answers(accel, rays) {
+        for (i, ray) in rays.iter().enumerate() {
+            found.add(faults(i, hits[i], occluded[i]), || {
+                format!("{name}: {ray:?} has {:?} (occluded: {})", hits[i], occluded[i])
+            });
+        }
+    }
+    found
 }
 
-/// How many answers name a distance that is not within the ray's interval.
-fn outside(accel: &dyn Accelerator, rays: &[Ray]) -> usize {
+/// The answers of any entry point that are hits, of closest-hit and any-hit queries.
+fn hits(name: &str, accel: &dyn Accelerator, rays: &[Ray]) -> Faults {
+    faults_of(name, accel, rays, |_, hit, occluded| usize::from(hit.is_some()) + usize::from(occluded))
+}
+
+/// The answers with a distance that is not within the ray's interval.
+fn outside(name: &str, accel: &dyn Accelerator, rays: &[Ray]) -> Faults {
     let within = |ray: &Ray, t: f32| ray.t_min <= t && t <= ray.t_max;
-    let of = |hits: Vec<Option<Hit>>| {
-        hits.iter().zip(rays).filter(|(hit, ray)| hit.is_some_and(|h| !within(ray, h.t))).count()
-    };
-    all_answers(accel, rays).into_iter().map(|(hits, _)| of(hits)).sum()
+    faults_of(name, accel, rays, |i, hit, _| usize::from(hit.is_some_and(|hit| !within(&rays[i], hit.t))))
 }
 
 pub(super) fn e1_invalid_rays(effort: Effort) -> Outcome {
@@ -100,23 +112,25 @@ pub(super) fn e1_invalid_rays(effort: Effort) -> Outcome {
     let mut rng = Rng::new(21);
     let wild: Vec<Ray> = (0..effort.pick(3_000, 400_000)).map(|_| wild_ray(&mut rng)).collect();
     let wild_invalid: Vec<Ray> = wild.iter().filter(|ray| !ray.is_valid()).copied().collect();
-    let (mut struck, mut disturbed, mut beyond) = (0, 0, 0);
+    let (mut struck, mut disturbed, mut beyond) = (Faults::default(), Faults::default(), Faults::default());
     for geometry in &scenes() {
         for (name, accel) in everyone(geometry) {
-            struck += hits(&*accel, &invalid);
-            for (hits, occluded) in all_answers(&*accel, &mixed) {
-                let right = |i: usize| hits[i].is_some() == (i % 3 == 1) && occluded[i] == (i % 3 == 1);
-                disturbed += (0..mixed.len()).filter(|&i| !right(i)).count();
-            }
+            struck += hits(name, &*accel, &invalid);
+            disturbed += faults_of(name, &*accel, &mixed, |i, hit, occluded| {
+                usize::from([hit.is_some(), occluded] != [i % 3 == 1; 2])
+            });
             // The oracle sees as many as it has time for.
             let few = if name == "linear" { 2_000 } else { wild.len() };
-            struck += hits(&*accel, &wild_invalid[..few.min(wild_invalid.len())]);
-            beyond += outside(&*accel, &wild[..few.min(wild.len())]);
+            struck += hits(name, &*accel, &wild_invalid[..few.min(wild_invalid.len())]);
+            beyond += outside(name, &*accel, &wild[..few.min(wild.len())]);
         }
     }
     Outcome::new()
         .record("invalid rays", (invalid.len() + wild_invalid.len()) as f64)
-        .none("valid among those made to be invalid", invalid.iter().filter(|ray| ray.is_valid()).count())
+        .none(
+            "valid among those made to be invalid",
+            Faults::of(&invalid, |ray| usize::from(ray.is_valid()), |ray| format!("{ray:?}")),
+        )
         .at_least("valid rays among the wild", (wild.len() - wild_invalid.len()) as f64, 0.4 * wild.len() as f64)
         .none("invalid rays that hit", struck)
         .none("rays between invalid ones with another answer", disturbed)
@@ -125,9 +139,9 @@ pub(super) fn e1_invalid_rays(effort: Effort) -> Outcome {
 
 pub(super) fn e2_zero_directions(effort: Effort) -> Outcome {
     let mut rng = Rng::new(22);
-    let (mut struck, mut beyond, mut tried) = (0, 0, 0);
+    let (mut struck, mut beyond, mut tried) = (Faults::default(), Faults::default(), 0);
     for geometry in &scenes() {
-        for (_, accel) in everyone(geometry) {
+        for (name, accel) in everyone(geometry) {
             let (mut zeros, mut tiny) = (Vec::new(), Vec::new());
             for _ in 0..effort.pick(200, 5_000) {
                 let start = Ray::new(3.0 * rng.cube().as_vec3(), rng.direction().as_vec3());
@@ -144,8 +158,8 @@ pub(super) fn e2_zero_directions(effort: Effort) -> Outcome {
                 }));
             }
             tried += zeros.len();
-            struck += hits(&*accel, &zeros);
-            beyond += outside(&*accel, &tiny);
+            struck += hits(name, &*accel, &zeros);
+            beyond += outside(name, &*accel, &tiny);
         }
     }
     Outcome::new()
@@ -203,7 +217,8 @@ fn walk(accel: &dyn Accelerator, mut ray: Ray, limit: usize) -> Vec<f32> {
 
 pub(super) fn e6_steps_past_hits(effort: Effort) -> Outcome {
     const PLANES: usize = 17;
-    let (mut walks, mut endless, mut backward, mut incomplete, mut again) = (0, 0, 0, 0, 0);
+    let mut walks = 0;
+    let [mut endless, mut backward, mut incomplete, mut again] = [const { Faults::NONE }; 4];
     let mut rng = Rng::new(23);
     for scale in [1.0, 1e-10, 1e-20] {
         let plane = |i: usize| DVec3::Z * (i as f64 * scale);
@@ -211,22 +226,23 @@ pub(super) fn e6_steps_past_hits(effort: Effort) -> Outcome {
         let side =
             |i: usize| triangle(corner(i, -DVec3::X - DVec3::Y), corner(i, 2.0 * DVec3::X), corner(i, 2.0 * DVec3::Y));
         let geometry = meshes((0..PLANES).map(side).collect());
-        for (_, accel) in everyone(&geometry) {
+        for (name, accel) in everyone(&geometry) {
             for length in [1.0, 1e10, 1e18] {
                 for _ in 0..effort.pick(10, 1_000) {
                     let start = scale * DVec3::new(rng.range(-0.5, 0.5), rng.range(-0.5, 0.5), 0.0);
                     let ray = Ray::new(start.as_vec3(), Vec3::new(0.0, 0.0, length));
                     let distances = walk(&*accel, ray, PLANES + 1);
                     walks += 1;
-                    endless += usize::from(distances.len() > PLANES);
-                    backward += distances.windows(2).filter(|pair| pair[1] <= pair[0]).count();
+                    let describe = || format!("{name}: {ray:?} has {distances:?}");
+                    endless.require(distances.len() <= PLANES, describe);
+                    backward.add(distances.windows(2).filter(|pair| pair[1] <= pair[0]).count(), describe);
                     // Smaller distances than normal floats may be stepped over.
                     if scale / f64::from(length) > f64::from(SMALLEST_NORMAL) * 1e6 && scale > 1e-18 {
-                        incomplete += usize::from(distances.len() != PLANES);
+                        incomplete.require(distances.len() == PLANES, describe);
                     }
                     // Past a hit at zero even the smallest step is one, and so it is where denormals count as zero.
                     let stepped = [step_past(0.0), SMALLEST].map(|t_min| accel.intersect(&Ray { t_min, ..ray }));
-                    again += stepped.iter().flatten().filter(|hit| hit.t == 0.0).count();
+                    again.add(stepped.iter().flatten().filter(|hit| hit.t == 0.0).count(), describe);
                 }
             }
         }

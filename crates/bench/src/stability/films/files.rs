@@ -2,7 +2,7 @@
 
 use half::f16;
 
-use super::{Effort, Outcome, bytes, mean_by_film};
+use super::{Effort, Faults, Outcome, bytes, mean_by_film};
 use crate::color::linear_from_srgb;
 use crate::desc::{CompressionDesc, LayerKind, OutputDesc, PixelTypeDesc, ViewDesc};
 use crate::film::{Crop, Image, Layer, LayerInfo};
@@ -88,7 +88,7 @@ pub(super) fn m7_files(effort: Effort) -> Outcome {
     let Ok(folder) = tempfile::tempdir() else { return Outcome::new() };
     let path = folder.path().join("a.exr");
     let mut rng = Rng::new(7);
-    let (mut floats, mut halves, mut again, mut lost) = (0, 0, 0, 0);
+    let [mut floats, mut halves, mut again, mut lost] = [const { Faults::NONE }; 4];
     for _ in 0..effort.pick(2, 50) {
         let image = picture(&mut rng);
         for (compression, pixel_type) in
@@ -96,18 +96,19 @@ pub(super) fn m7_files(effort: Effort) -> Outcome {
         {
             let layers = vec![LayerKind::Z, LayerKind::N, LayerKind::P, LayerKind::Albedo];
             let desc = OutputDesc { layers, pixel_type, compression: Some(compression), ..OutputDesc::new("a.exr") };
+            let describe = || format!("{compression:?}, {pixel_type:?}");
             let written = write_exr(&path, &image, &desc, &RenderInfo::default());
             let Ok(read) = written.and_then(|()| read_exr(&path)) else {
-                lost += 1;
+                lost.require(false, describe);
                 continue;
             };
             if pixel_type == PixelTypeDesc::Float {
-                floats += changed(&image, &read, |x| x);
+                floats.add(changed(&image, &read, |x| x), describe);
             } else {
-                halves += changed(&image, &read, halved);
+                halves.add(changed(&image, &read, halved), describe);
                 // A picture of halves is written as it was read.
                 let twice = write_exr(&path, &read, &desc, &RenderInfo::default()).and_then(|()| read_exr(&path));
-                again += usize::from(twice.map(|image| bytes(&image)).ok() != Some(bytes(&read)));
+                again.require(twice.map(|image| bytes(&image)).ok() == Some(bytes(&read)), describe);
             }
         }
     }

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use statrs::function::erf::erf;
 
-use super::{Effort, Outcome, sidak_level};
+use super::{Effort, Faults, Outcome, sidak_level};
 use crate::desc::FilterDesc;
 use crate::film::Filter;
 use crate::math::Vec2;
@@ -27,7 +27,7 @@ fn closed_form(desc: &FilterDesc, r: f64) -> f64 {
 
 pub(super) fn m1_integrals(effort: Effort) -> Outcome {
     let steps = effort.pick(256, 2048);
-    let (mut worst, mut outside) = (0f64, 0);
+    let (mut worst, mut outside) = (0f64, Faults::NONE);
     for desc in &Filter::EXAMPLES {
         let filter = Filter::new(desc);
         let r = f64::from(filter.radius());
@@ -40,7 +40,7 @@ pub(super) fn m1_integrals(effort: Effort) -> Outcome {
         worst = worst.max((measured / closed_form(desc, r).powi(2) - 1.0).abs());
         let beyond = filter.radius().next_up();
         let places = [Vec2::new(beyond, 0.0), Vec2::new(0.0, -beyond), Vec2::new(-2.0 * beyond, 3.0 * beyond)];
-        outside += places.into_iter().filter(|&p| filter.evaluate(p) != 0.0).count();
+        outside += Faults::of(&places, |&p| usize::from(filter.evaluate(p) != 0.0), |p| format!("{desc:?} at {p}"));
     }
     Outcome::new()
         // Midpoints of 256 steps err by some h^2 / 24 of the second derivative: far below the percent of pbrt's test.

@@ -11,7 +11,7 @@ use filters::{m1_integrals, m2_sampled_filters};
 
 use super::geometry::Rng;
 use super::render::{Estimate, pixels, prepare, render, render_with};
-use super::{Effort, Outcome, sidak_level};
+use super::{Effort, Faults, Outcome, sidak_level};
 use crate::accel::AccelKind;
 use crate::color::Rgb;
 use crate::desc::{FilterDesc, FilterSamplesDesc};
@@ -92,7 +92,7 @@ fn mean_by_film(values: impl Iterator<Item = f32>) -> f64 {
 fn m3_constants(effort: Effort) -> Outcome {
     let mut filtering =
         Filtering { filter: Filter::new(&FilterDesc::default()), rng: Rng::new(3), splats: Splats::default() };
-    let (mut worst, mut short) = (0f64, 0);
+    let (mut worst, mut short) = (0f64, Faults::NONE);
     let error = |image: &Image| image.layers[0].data.iter().map(|v| f64::from((v - 1.0).abs())).fold(0.0, f64::max);
     for (desc, tile_size) in filters().flat_map(|desc| [1, 7, 64].map(|size| (desc, size))) {
         filtering.filter = Filter::new(&desc);
@@ -108,7 +108,7 @@ fn m3_constants(effort: Effort) -> Outcome {
                     }
                 }
                 let image = film.resolve();
-                short += usize::from(image.layers[0].data.len() != crop.area() as usize * 4);
+                short.require(image.layers[0].data.len() == crop.area() as usize * 4, || format!("{desc:?}, {crop:?}"));
                 worst = worst.max(error(&image));
             }
         }
@@ -192,7 +192,11 @@ fn m4_same_bytes(effort: Effort) -> Outcome {
         render_with(&prepare(&lively_scene(), &overrides), AccelKind::EMBREE).image
     };
     let alone = of(1);
-    let differ = [2, 3, 8].into_iter().filter(|&threads| bytes(&of(threads)) != bytes(&alone)).count();
+    let differ = Faults::of(
+        &[2, 3, 8],
+        |&threads| usize::from(bytes(&of(threads)) != bytes(&alone)),
+        |threads| format!("{threads} threads"),
+    );
 
     let [of_lobes, shared] = [Filter::EXAMPLES[8], Filter::examples(FilterSamplesDesc::Shared)[8]];
     let tiles: Vec<usize> = (0..filled(&[], &shared).tiles().len()).collect();
@@ -205,7 +209,7 @@ fn m4_same_bytes(effort: Effort) -> Outcome {
         order.sort_by_cached_key(|_| rng.bits());
         orders.push(order);
     }
-    let shuffled = orders.iter().filter(|order| pictures(order) != expected).count();
+    let shuffled = Faults::of(&orders, |order| usize::from(pictures(order) != expected), |order| format!("{order:?}"));
     let files = files::differing_files(&[of(1), of(2), of(8)]);
     Outcome::new()
         .none("numbers of threads with other bits than one thread", differ)
@@ -267,7 +271,7 @@ fn m6_spoilt_samples(effort: Effort) -> Outcome {
         }
     };
     let mut film = film(FilmShape::new([8, 8], Crop::full([8, 8]), LayerSet::FULL), 4);
-    let (mut bad, mut taken, mut refused) = (0u64, 0, 0);
+    let (mut bad, mut taken, mut refused) = (0u64, Faults::NONE, Faults::NONE);
     for tile in film.tiles_mut() {
         for pixel in 0..16 {
             for sample in 0..effort.pick(50, 20_000) {
@@ -276,16 +280,19 @@ fn m6_spoilt_samples(effort: Effort) -> Outcome {
                     let value =
                         Sample { pixel: &value, surface: Some(&surface), light_aovs: LightAovSample::default() };
                     bad += 1;
-                    taken += usize::from(tile.add(pixel, sample, value, weight));
+                    let is_taken = tile.add(pixel, sample, value, weight);
+                    taken.require(!is_taken, || format!("{value:?} of weight {weight}"));
                 } else {
-                    refused += usize::from(!tile.add(pixel, sample, &gray(0.25), 1.0));
+                    let is_taken = tile.add(pixel, sample, &gray(0.25), 1.0);
+                    refused.require(is_taken, || format!("pixel {pixel}, sample {sample}"));
                 }
             }
         }
     }
     let image = film.resolve();
     let infinite = image.layers.iter().flat_map(|layer| &layer.data).filter(|v| !v.is_finite()).count();
-    let wrong = pixels(&image).filter(|p| *p != [0.25; 3]).count();
+    let found: Vec<_> = pixels(&image).enumerate().collect();
+    let wrong = Faults::of(&found, |(_, p)| usize::from(*p != [0.25; 3]), |(i, p)| format!("pixel {i}: {p:?}"));
     let first = film.dropped().first().copied();
     let replayable = first.is_some_and(|d| d.x < 8 && d.y < 8);
     Outcome::new()

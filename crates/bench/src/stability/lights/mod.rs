@@ -10,7 +10,7 @@ mod tables;
 
 use super::geometry::transform;
 use super::verdict::Tests;
-use super::{Effort, Outcome};
+use super::{Effort, Faults, Outcome};
 use crate::color::Rgb;
 use crate::geometry::{Analytic, Geometry, Shape, TransformedShape};
 use crate::id::{PrimId, ShapeId};

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::{Effort, Outcome, Tests};
+use super::{Effort, Faults, Outcome, Tests};
 use crate::color::Rgb;
 use crate::light::{Environment, EnvironmentMap, MisCompensation};
 use crate::math::{DMat3, DVec3, Rng, Vec3};
@@ -136,18 +136,17 @@ fn lookups() -> [f64; 3] {
 
 /// Directions along the axes and at corners of texels where the density or the light is not a number, or zero where
 /// there is light.
-fn bad_corners() -> usize {
+fn bad_corners() -> Faults {
     let sky = Sky::new("corners", [16, 8], DMat3::IDENTITY, |x, y| (1 + x + y) as f32);
     let near_poles =
         [Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z, Vec3::X, Vec3::new(1e-20, 1.0, 0.0), Vec3::new(0.0, -1.0, -1e-30)];
     let corners = (0..=8).flat_map(|y| (0..=16).map(move |x| (f64::from(x) / 16.0, PI * f64::from(y) / 8.0)));
     let directions = near_poles.into_iter().chain(corners.map(|(u, theta)| sky.direction(u, theta)));
-    directions
-        .filter(|&d| {
-            let at = sky.environment.eval(d, MisCompensation::Off);
-            !(at.pdf > 0.0 && at.pdf.is_finite() && at.radiance.is_finite())
-        })
-        .count()
+    let is_bad = |&d: &Vec3| {
+        let at = sky.environment.eval(d, MisCompensation::Off);
+        usize::from(!(at.pdf > 0.0 && at.pdf.is_finite() && at.radiance.is_finite()))
+    };
+    Faults::of(&directions.collect::<Vec<_>>(), is_bad, |d| format!("direction {d}"))
 }
 
 pub(super) fn l7_environment_maps(effort: Effort) -> Outcome {
@@ -170,7 +169,7 @@ pub(super) fn l7_environment_maps(effort: Effort) -> Outcome {
         bounded = bounded.max(high / fluence);
         strays = strays.max(found.strays as f64 / f64::from(count));
         radiance = radiance.max(found.radiance);
-        invalid += found.invalid;
+        invalid.add(found.invalid, || sky.name.to_owned());
     }
     let [shift, seam, pole] = lookups();
     let outcome = Outcome::new()

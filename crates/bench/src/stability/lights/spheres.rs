@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::{Effort, Outcome, TWO_SIDED, Tests, first_light, grid, place, target, transform};
+use super::{Effort, Faults, Outcome, TWO_SIDED, Tests, first_light, grid, place, target, transform};
 use crate::geometry::{Analytic, Geometry, Sphere};
 use crate::id::{PrimId, ShapeId};
 use crate::light::AreaLight;
@@ -102,7 +102,7 @@ pub(super) fn l3_far_spheres(effort: Effort) -> Outcome {
 pub(super) fn l4_directions(effort: Effort) -> Outcome {
     let (geometry, light) = lamp(RADIUS);
     let shape = geometry.shape(ShapeId(0));
-    let (mut lost, mut cone, mut along, mut point) = (0, 0f64, 0f64, 0f64);
+    let (mut lost, mut cone, mut along, mut point) = (Faults::NONE, 0f64, 0f64, 0f64);
     for d in [1.05, 2.0, 10.0, 100.0] {
         let p = (CENTER + ASIDE * (d * RADIUS)).as_vec3().as_dvec3();
         let distance = (CENTER - p).length();
@@ -110,7 +110,7 @@ pub(super) fn l4_directions(effort: Effort) -> Outcome {
         let one_minus_cos_max = solid_angle(distance / RADIUS) / TAU;
         for u in grid(10) {
             let Some(s) = light.sample(&geometry, &[], p, u) else {
-                lost += 1;
+                lost.require(false, || format!("no sample at {p} for {u:?}"));
                 continue;
             };
             // The chord keeps the digits of small angles.
@@ -122,7 +122,7 @@ pub(super) fn l4_directions(effort: Effort) -> Outcome {
             let ray = Ray::new(p.as_vec3(), s.wi);
             let at = shape.intersect_prim(&ray, ShapeId(0), PrimId(0)).and_then(|hit| geometry.interaction(&ray, &hit));
             let Some(at) = at else {
-                lost += 1;
+                lost.require(false, || format!("no hit of {ray:?}"));
                 continue;
             };
             point = point.max((at.p - target(&s)).length() / distance);

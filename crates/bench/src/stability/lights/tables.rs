@@ -1,6 +1,6 @@
 //! Discrete and piecewise constant distributions.
 
-use super::{Effort, Outcome, Tests};
+use super::{Effort, Faults, Outcome, Tests};
 use crate::math::Rng;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::sampling::{AliasTable, Piecewise2d};
@@ -54,7 +54,8 @@ fn walk(weights: &[f64], table: &AliasTable, bits: u32) -> Found {
 pub(super) fn l9_tables(effort: Effort) -> Outcome {
     let bits = effort.pick(20, 24);
     let n = f64::from(1u32 << bits);
-    let (mut shares, mut zero, mut out_of_range, mut left, mut pmf) = (0f64, 0, 0, 0f64, 0f64);
+    let (mut shares, mut left, mut pmf) = (0f64, 0f64, 0f64);
+    let (mut zero, mut out_of_range) = (Faults::NONE, Faults::NONE);
     for weights in tables() {
         let Some(table) = AliasTable::new(&weights) else { return Outcome::new() };
         let largest = weights.iter().copied().fold(0.0, f64::max);
@@ -65,8 +66,8 @@ pub(super) fn l9_tables(effort: Effort) -> Outcome {
         let found = walk(&weights, &table, bits);
         // Each bin has two pieces, whose ends round by up to one number each.
         shares = shares.max(found.share * n / (2.0 * weights.len() as f64 + 2.0));
-        zero += found.zero;
-        out_of_range += found.out_of_range;
+        zero.add(found.zero, || format!("table {weights:?}"));
+        out_of_range.add(found.out_of_range, || format!("table {weights:?}"));
         left = found.left.iter().fold(left, |worst, &c| worst.max((f64::from(c) / n * 16.0 - 1.0).abs()));
     }
 
@@ -91,8 +92,9 @@ pub(super) fn l9_tables(effort: Effort) -> Outcome {
         tests.counts(&format!("{width} x {height}"), &counts, &expected);
         for u in [[0.0, 0.0], [0.0, ONE_MINUS_EPSILON], [ONE_MINUS_EPSILON, 0.0], [ONE_MINUS_EPSILON; 2]] {
             let cell = density.sample_cell(u);
-            zero += usize::from(weights[cell.y * width + cell.x] == 0.0);
-            out_of_range += usize::from(!cell.within.iter().all(|w| (0.0..1.0).contains(w)));
+            let describe = || format!("{width} x {height} for {u:?}: {cell:?}");
+            zero.require(weights[cell.y * width + cell.x] != 0.0, describe);
+            out_of_range.require(cell.within.iter().all(|w| (0.0..1.0).contains(w)), describe);
         }
     }
     let outcome = Outcome::new()

@@ -5,7 +5,7 @@ use twofloat::TwoFloat;
 use crate::math::{Quadratic, difference_of_products, solve_quadratic};
 use crate::stability::geometry::Rng;
 use crate::stability::oracle::{quotient, root, value};
-use crate::stability::{Effort, Outcome};
+use crate::stability::{Effort, Faults, Outcome};
 
 /// Distance between neighbouring numbers at `x`.
 fn ulp(x: f64) -> f64 {
@@ -28,7 +28,7 @@ fn exact_roots(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
 
 pub(super) fn c10_quadratic_solver(effort: Effort) -> Outcome {
     let mut rng = Rng::new(49);
-    let (mut other_count, mut error, mut difference) = (0, 0f64, 0f64);
+    let (mut other_count, mut error, mut difference) = (Faults::NONE, 0f64, 0f64);
     for i in 0..effort.pick(100_000, 10_000_000) {
         let mut number = || rng.magnitude(-8.0, 8.0) * if rng.unit() < 0.5 { -1.0 } else { 1.0 };
         let (a, b, mut c) = (number(), number(), number());
@@ -43,7 +43,9 @@ pub(super) fn c10_quadratic_solver(effort: Effort) -> Outcome {
                 error = error.max((found.near / near - 1.0).abs()).max((found.far / far - 1.0).abs());
             }
             (None, None) => {}
-            _ => other_count += 1,
+            (found, exact) => {
+                other_count.require(false, || format!("{a:?}, {b:?}, {c:?} have {found:?} in place of {exact:?}"));
+            }
         }
     }
     let has = |r: Option<Quadratic>, t: f64| r.is_some_and(|r| r.near == t || r.far == t);
@@ -65,5 +67,12 @@ pub(super) fn c10_quadratic_solver(effort: Effort) -> Outcome {
         // Of the discriminant 3, half of that and 1 of its root, 1 of the sum, 1 of the quotient; and 1 of the
         // reference.
         .at_most("relative error of a root in 2^-53", error * 2f64.powi(53), 5.5)
-        .none("wrong for vanishing coefficients", right.iter().filter(|right| !**right).count())
+        .none(
+            "wrong for vanishing coefficients",
+            Faults::of(
+                &right.into_iter().enumerate().collect::<Vec<_>>(),
+                |(_, right)| usize::from(!right),
+                |(i, _)| format!("case {i}"),
+            ),
+        )
 }

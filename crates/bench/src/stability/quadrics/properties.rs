@@ -11,7 +11,7 @@ use crate::math::float::{F64_CHAIN_ERROR, UNIT_ROUNDOFF};
 use crate::math::{Bounds, DMat3, DVec3, Frame, Ray, RayF64, Transform, dvec3};
 use crate::stability::geometry::{Rng, closest, ray_through, transform, world};
 use crate::stability::oracle::{Answer, Case, ExactTransform, partial_cases, whole_cases};
-use crate::stability::{Effort, Outcome};
+use crate::stability::{Effort, Faults, Outcome};
 
 const VALID: &str = "the checks' shapes are valid";
 const VASE: [[f64; 2]; 7] = [[0.0, -1.0], [0.9, -1.0], [1.2, -0.3], [0.5, 0.2], [0.2, 0.4], [0.3, 0.9], [0.6, 1.0]];
@@ -47,9 +47,9 @@ fn hit_from_above(shape: &Analytic, p: DVec3, n: DVec3) -> Option<LocalSurface> 
 }
 
 /// Wrong distances of rays along the axes, at the heights beside the shapes, where each has the radius 2.
-fn wrong_roots(shapes: [(&Analytic, f64); 3]) -> usize {
+fn wrong_roots(shapes: [(&Analytic, f64); 3]) -> Faults {
     // Numbers with few digits: the answers are exact.
-    let mut wrong = 0;
+    let mut wrong = Faults::NONE;
     for (shape, z) in shapes {
         for axis in [DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y] {
             let ray = |start: f64, t_min: f32, t_max: f32| Ray {
@@ -72,7 +72,10 @@ fn wrong_roots(shapes: [(&Analytic, f64); 3]) -> usize {
                 (ray(-5.0, 0.0, 3f32.next_down()), None),
                 (ray(-5.0, 0.0, 3.0), Some(3.0)),
             ];
-            wrong += expected.iter().filter(|(ray, t)| distance(shape, ray) != *t).count();
+            for (ray, t) in expected {
+                let found = distance(shape, &ray);
+                wrong.require(found == t, || format!("{shape:?}: {ray:?} has {found:?} in place of {t:?}"));
+            }
         }
     }
     wrong
@@ -85,17 +88,18 @@ pub(super) fn c2_choice_of_root(effort: Effort) -> Outcome {
     let cone = Analytic::Frustum(Frustum::new(4.0, 0.0, 4.0, TAU).expect(VALID));
     let wrong = wrong_roots([(&sphere, 0.0), (&cylinder, 2.0), (&cone, 2.0)]);
     // Exactly tangent: either answer, but a number.
-    let mut not_numbers = 0;
+    let mut not_numbers = Faults::NONE;
     for shape in [&sphere, &cylinder] {
         for (from, d) in
             [(dvec3(-5.0, 2.0, 0.0), DVec3::X), (dvec3(2.0, -5.0, 0.0), DVec3::Y), (dvec3(-2.0, 9.0, 0.0), -DVec3::Y)]
         {
-            not_numbers +=
-                usize::from(distance(shape, &Ray::new(from.as_vec3(), d.as_vec3())).is_some_and(|t| !t.is_finite()));
+            let ray = Ray::new(from.as_vec3(), d.as_vec3());
+            let found = distance(shape, &ray);
+            not_numbers.require(found.is_none_or(f32::is_finite), || format!("{shape:?}: {ray:?} has {found:?}"));
         }
     }
     // From within and from next to the surface.
-    let (mut rays, mut undecidable, mut disagree) = (0, 0usize, 0);
+    let (mut rays, mut undecidable, mut disagree) = (0, 0usize, Faults::NONE);
     for case in whole_cases() {
         for _ in 0..effort.pick(5_000, 500_000) {
             let sample = case.shape.sample([rng.unit(), rng.unit()]);
@@ -106,16 +110,20 @@ pub(super) fn c2_choice_of_root(effort: Effort) -> Outcome {
             let geometry = placed(&case.shape, at.world_from_object.matrix3, at.world_from_object.translation);
             let found = closest(&LinearAccel::new(&geometry), &geometry, &ray).found;
             rays += 1;
-            match (case.answer(&ExactTransform::new(&at), &ray, 4.0 * F64_CHAIN_ERROR), found) {
-                (Answer::Undecidable, _) => undecidable += 1,
-                (Answer::Miss, None) => {}
+            let answer = case.answer(&ExactTransform::new(&at), &ray, 4.0 * F64_CHAIN_ERROR);
+            let is_right = match (answer, found) {
+                (Answer::Undecidable, _) | (Answer::Miss, None) => true,
                 // The distance is rounded to f32; of a grazing one more than that is in doubt.
                 (Answer::Hit { t, p }, Some(at)) => {
-                    let right = (f64::from(at.t) - t).abs() <= UNIT_ROUNDOFF * t + 1e-9 && (at.p - p).length() < 1e-9;
-                    disagree += usize::from(!right);
+                    (f64::from(at.t) - t).abs() <= UNIT_ROUNDOFF * t + 1e-9 && (at.p - p).length() < 1e-9
                 }
-                _ => disagree += 1,
-            }
+                _ => false,
+            };
+            undecidable += usize::from(answer == Answer::Undecidable);
+            disagree.require(is_right, || {
+                let found = found.map(|at| (at.t, at.p));
+                format!("{} at {at:?}: {ray:?} has {found:?} in place of {answer:?}", case.name)
+            });
         }
     }
     Outcome::new()
@@ -127,7 +135,7 @@ pub(super) fn c2_choice_of_root(effort: Effort) -> Outcome {
 
 pub(super) fn c3_grid_of_rays(effort: Effort) -> Outcome {
     let mut rng = Rng::new(42);
-    let (mut wrong, mut rays) = (0, 0);
+    let (mut wrong, mut rays) = (Faults::NONE, 0);
     for _ in 0..effort.pick(200, 10_000) {
         for radius in [1.0, 3.0] {
             let shape = Analytic::Sphere(Sphere::full(radius).expect(VALID));
@@ -141,9 +149,10 @@ pub(super) fn c3_grid_of_rays(effort: Effort) -> Outcome {
                     let inside = radius * radius - x * x - y * y;
                     if inside.abs() > 1e-8 {
                         rays += 1;
-                        wrong += usize::from(
-                            accel.intersect(&ray).is_some() != (inside > 0.0) || accel.occluded(&ray) != (inside > 0.0),
-                        );
+                        let answers = [accel.intersect(&ray).is_some(), accel.occluded(&ray)];
+                        wrong.require(answers == [inside > 0.0; 2], || {
+                            format!("radius {radius}: {ray:?}: hit, occluded: {answers:?}")
+                        });
                     }
                 }
             }
@@ -154,8 +163,8 @@ pub(super) fn c3_grid_of_rays(effort: Effort) -> Outcome {
 
 pub(super) fn c4_derivatives(effort: Effort) -> Outcome {
     let mut rng = Rng::new(43);
-    let (mut change, mut slope, mut tried, mut few) = (0f64, 0f64, 0usize, 0);
-    for (_, shape) in shapes() {
+    let (mut change, mut slope, mut tried, mut few) = (0f64, 0f64, 0usize, Faults::NONE);
+    for (name, shape) in shapes() {
         let before = tried;
         for _ in 0..effort.pick(200, 20_000) {
             let sample = shape.sample([rng.range(0.02, 0.98), rng.range(0.05, 0.95)]);
@@ -174,7 +183,7 @@ pub(super) fn c4_derivatives(effort: Effort) -> Outcome {
                 tried += 1;
             }
         }
-        few += usize::from(tried - before < effort.pick(300, 30_000));
+        few.require(tried - before >= effort.pick(300, 30_000), || format!("{name}: {}", tried - before));
     }
     Outcome::new()
         .at_most("error of the change of u and v", change, 2e-2)
@@ -187,7 +196,7 @@ pub(super) fn c5_parameters_round_trip(effort: Effort) -> Outcome {
     let side = effort.pick(10, 100);
     let middle = |i: i32| (f64::from(i) + 0.5) / f64::from(side);
     let mut rng = Rng::new(44);
-    let (mut missed, mut place, mut parameters) = (0, 0f64, 0f64);
+    let (mut missed, mut place, mut parameters) = (Faults::NONE, 0f64, 0f64);
     let mut check = |shape: &Analytic, at: DVec3, uv: [f64; 2]| {
         let geometry = placed(shape, rng.rotation(), rng.cube());
         let Shape::Analytic(on) = geometry.shape(crate::id::ShapeId(0)) else { return };
@@ -199,7 +208,7 @@ pub(super) fn c5_parameters_round_trip(effort: Effort) -> Outcome {
             hit_from_above(shape, at, n).filter(|s| (s.p - at).length() < 1e-6).map(|s| s.n)
         });
         let Some(n) = normal.map(|n| on.transform.vector(n)) else {
-            missed += 1;
+            missed.require(false, || format!("{shape:?} at {at}, from all sides"));
             return;
         };
         let ray = ray_through(p + n * 0.125, p);
@@ -209,7 +218,7 @@ pub(super) fn c5_parameters_round_trip(effort: Effort) -> Outcome {
                 let uv_found = [found.uv.x, found.uv.y].map(f64::from);
                 parameters = parameters.max((uv_found[0] - uv[0]).abs()).max((uv_found[1] - uv[1]).abs());
             }
-            None => missed += 1,
+            None => missed.require(false, || format!("{shape:?} at {at}: {ray:?}")),
         }
     };
     let cases: Vec<Case> = whole_cases().into_iter().chain(partial_cases()).collect();
@@ -244,8 +253,8 @@ pub(super) fn c6_singularities(_: Effort) -> Outcome {
     ];
     let points =
         [DVec3::ZERO, DVec3::Z, -DVec3::Z, 2.0 * DVec3::Z, 1.5 * DVec3::Z, 0.75 * DVec3::Z, DVec3::Y, -DVec3::Y];
-    let (mut broken, mut hits, mut unit, mut frame) = (0, 0usize, 0f64, 0f64);
-    for (_, shape) in shapes() {
+    let (mut broken, mut hits, mut unit, mut frame) = (Faults::NONE, 0usize, 0f64, 0f64);
+    for (name, shape) in shapes() {
         for p in points {
             for d in directions {
                 let ray = endless(p - 2.0 * d, d);
@@ -255,7 +264,8 @@ pub(super) fn c6_singularities(_: Effort) -> Outcome {
                 let finite = hit.t.is_finite() && s.p.is_finite() && s.dp_du.is_finite() && s.dp_dv.is_finite();
                 let in_range =
                     s.uv.iter().all(|x| (0.0..=1.0).contains(x)) && s.pdf_area.is_finite() && s.pdf_area > 0.0;
-                broken += usize::from(!(finite && in_range));
+                let describe = || format!("{name}: {ray:?} meets {s:?} at {}", hit.t);
+                broken.require(finite && in_range, describe);
                 unit = unit.max((s.n.length() - 1.0).abs());
                 let Frame { x, y, z } = Frame::from_normal_and_tangent(s.n.as_vec3(), s.dp_du.as_vec3());
                 let [x, y, z] = [x, y, z].map(crate::math::Vec3::as_dvec3);
@@ -263,7 +273,7 @@ pub(super) fn c6_singularities(_: Effort) -> Outcome {
                 let angles = [x.dot(y), y.dot(z), z.dot(x)].map(f64::abs);
                 frame = lengths.into_iter().chain(angles).fold(frame, f64::max);
                 // A NaN is lost in a maximum.
-                broken += usize::from(!(x.is_finite() && y.is_finite() && s.n.is_finite()));
+                broken.require(x.is_finite() && y.is_finite() && s.n.is_finite(), describe);
             }
         }
     }
@@ -276,7 +286,7 @@ pub(super) fn c6_singularities(_: Effort) -> Outcome {
 
 pub(super) fn c8_bounds(effort: Effort) -> Outcome {
     let mut rng = Rng::new(45);
-    let (mut outside, mut excess, mut lack) = (0, 0f64, 0f64);
+    let (mut outside, mut excess, mut lack) = (Faults::NONE, 0f64, 0f64);
     let mut compare = |bounds: Bounds, tight: Bounds| {
         let (over, under) = (
             (bounds.max - tight.max).max(tight.min - bounds.min),
@@ -310,7 +320,7 @@ pub(super) fn c8_bounds(effort: Effort) -> Outcome {
         compare(vase(phi_max).bounds(), tight);
     }
     let shear = DMat3::from_cols(dvec3(1.2, 0.1, 0.0), dvec3(0.4, 0.7, -0.3), dvec3(0.0, 0.5, 2.0));
-    for (_, shape) in shapes() {
+    for (name, shape) in shapes() {
         for (linear, translation) in
             [(DMat3::IDENTITY, DVec3::ZERO), (rng.rotation(), 1e4 * rng.cube()), (shear, dvec3(10.0, -3.0, 100.0))]
         {
@@ -320,7 +330,8 @@ pub(super) fn c8_bounds(effort: Effort) -> Outcome {
                 // Corners and edges as well.
                 let edge = |k: i32, u: f64| if i % 7 == k { f64::from(i % 2) } else { u };
                 let u = [edge(1, rng.unit()), edge(2, rng.unit())];
-                outside += usize::from(!padded.contains(placed.transform.point(placed.shape.sample(u).p).as_vec3()));
+                let p = placed.transform.point(placed.shape.sample(u).p).as_vec3();
+                outside.require(padded.contains(p), || format!("{name}: {p} for {u:?}, box {padded:?}"));
             }
         }
     }
@@ -332,8 +343,8 @@ pub(super) fn c8_bounds(effort: Effort) -> Outcome {
 
 pub(super) fn c9_both_queries_agree(effort: Effort) -> Outcome {
     let mut rng = Rng::new(46);
-    let (mut rays, mut differ, mut late, mut lost) = (0, 0, 0, 0);
-    for (_, shape) in shapes() {
+    let (mut rays, mut differ, mut late, mut lost) = (0, Faults::NONE, Faults::NONE, Faults::NONE);
+    for (name, shape) in shapes() {
         let center = rng.cube();
         let geometry = placed(&shape, rng.rotation(), center);
         let embree = accel::build(AccelKind::EMBREE, &geometry, 1).expect("Embree builds");
@@ -348,7 +359,7 @@ pub(super) fn c9_both_queries_agree(effort: Effort) -> Outcome {
             for accel in accels {
                 let Some(first) = accel.intersect(&ray) else {
                     rays += 1;
-                    differ += usize::from(accel.occluded(&ray));
+                    differ.require(!accel.occluded(&ray), || format!("{name}: {ray:?} is occluded by nothing"));
                     continue;
                 };
                 let t = first.t;
@@ -361,15 +372,16 @@ pub(super) fn c9_both_queries_agree(effort: Effort) -> Outcome {
                     let (mut batch, mut any) = ([None; 3], [false; 3]);
                     accel.intersect_batch(&[part; 3], &mut batch, Coherence::Incoherent);
                     accel.occluded_batch(&[part; 3], &mut any, Coherence::Incoherent);
-                    differ += usize::from(
-                        accel.occluded(&part) != hit.is_some() || batch != [hit; 3] || any != [hit.is_some(); 3],
-                    );
-                    late += usize::from(hit.is_some_and(|hit| hit.t > t_max || hit.t < t_min));
+                    let describe = || format!("{name}: {part:?} has {hit:?}, {batch:?}, {any:?}; the ray {first:?}");
+                    let agree =
+                        accel.occluded(&part) == hit.is_some() && batch == [hit; 3] && any == [hit.is_some(); 3];
+                    differ.require(agree, describe);
+                    late.require(hit.is_none_or(|hit| t_min <= hit.t && hit.t <= t_max), describe);
                     // One float beyond a hit or before it leaves it inside whatever its rounding.
                     let must = t_max == t.next_up() || t_min == t.next_down();
-                    lost += usize::from(
-                        must && hit.is_none_or(|hit| hit.t != t) || (t_max == t.next_down() && hit.is_some()),
-                    );
+                    let is_wrong =
+                        must && hit.is_none_or(|hit| hit.t != t) || (t_max == t.next_down() && hit.is_some());
+                    lost.require(!is_wrong, describe);
                 }
             }
         }
@@ -401,7 +413,7 @@ fn capped_frustum([bottom, top]: [f64; 2], height: f64, at: impl Fn(DMat3, f64) 
 
 pub(super) fn c11_capped_solids(effort: Effort) -> Outcome {
     let mut rng = Rng::new(47);
-    let (mut leaks, mut at_rims, mut exact) = (0, 0, 0);
+    let [mut leaks, mut at_rims, mut exact] = [const { Faults::NONE }; 3];
     for (bottom, top, height) in [(65.0, 65.0, 64.0), (65.0, 0.0, 128.0), (16.25, 65.0, 32.0)] {
         for turned in [false, true] {
             let (turn, offset) =
@@ -411,8 +423,10 @@ pub(super) fn c11_capped_solids(effort: Effort) -> Outcome {
             }));
             let embree = accel::build(AccelKind::EMBREE, &geometry, 1).expect("Embree builds");
             let linear = LinearAccel::new(&geometry);
-            let leaks_in = |ray: &Ray| {
-                [&*embree as &dyn Accelerator, &linear].iter().any(|a| a.intersect(ray).is_none() || !a.occluded(ray))
+            let judge = |leaks: &mut Faults, ray: Ray| {
+                let all: [&dyn Accelerator; 2] = [&*embree, &linear];
+                let is_closed = all.iter().all(|a| a.intersect(&ray).is_some() && a.occluded(&ray));
+                leaks.require(is_closed, || format!("radii {bottom} and {top}, height {height}: {ray:?}"));
             };
             let place = |p: DVec3| offset + turn * p;
             for i in 0..effort.pick(50_000, 1_000_000) {
@@ -421,22 +435,20 @@ pub(super) fn c11_capped_solids(effort: Effort) -> Outcome {
                 let (sin, cos) = rng.range(0.0, TAU).sin_cos();
                 let from = place(dvec3(rho * cos, rho * sin, z));
                 if i % 10 > 0 {
-                    leaks += usize::from(leaks_in(&Ray::new(from.as_vec3(), rng.direction().as_vec3())));
+                    judge(&mut leaks, Ray::new(from.as_vec3(), rng.direction().as_vec3()));
                     continue;
                 }
                 let (sin, cos) = rng.range(0.0, TAU).sin_cos();
                 let (r, z) = if i % 20 == 0 { (bottom, 0.0) } else { (top, height) };
-                at_rims += usize::from(leaks_in(&ray_through(from, place(dvec3(r * cos, r * sin, z)))));
+                judge(&mut at_rims, ray_through(from, place(dvec3(r * cos, r * sin, z))));
             }
             for [x, y] in ON_CIRCLE {
                 for k in 1..effort.pick(20, 500) {
                     let from =
                         dvec3(0.25 * f64::from(k % 7), 0.125 * f64::from(k % 5), height * f64::from(k % 15 + 1) / 32.0);
                     for (r, z) in [(bottom, 0.0), (top, height)] {
-                        exact += usize::from(leaks_in(&ray_through(
-                            place(from),
-                            place(dvec3(x * r / 65.0, y * r / 65.0, z)),
-                        )));
+                        let target = place(dvec3(x * r / 65.0, y * r / 65.0, z));
+                        judge(&mut exact, ray_through(place(from), target));
                     }
                 }
             }
@@ -451,7 +463,8 @@ pub(super) fn c11_capped_solids(effort: Effort) -> Outcome {
 pub(super) fn c12_nudged_points(effort: Effort) -> Outcome {
     const NUDGE: f64 = 0.001;
     let mut rng = Rng::new(48);
-    let (mut sides, mut back, mut missed, mut hits) = (0, 0, 0, 0usize);
+    let mut hits = 0usize;
+    let [mut sides, mut back, mut missed] = [const { Faults::NONE }; 3];
     for case in whole_cases().iter().filter(|case| !case.is_flat()) {
         for _ in 0..effort.pick(1_000, 50_000) {
             let geometry = placed(&case.shape, rng.rotation(), DVec3::ZERO);
@@ -462,16 +475,18 @@ pub(super) fn c12_nudged_points(effort: Effort) -> Outcome {
             let accel = LinearAccel::new(&geometry);
             let Some(found) = closest(&accel, &geometry, &ray).found else {
                 // The middle may be seen through an open end.
-                missed += usize::from(matches!(case.shape, Analytic::Sphere(_)));
+                missed.require(!matches!(case.shape, Analytic::Sphere(_)), || format!("{ray:?}"));
                 continue;
             };
             hits += 1;
             let inside = |p: DVec3| case.is_inside(on.transform.inverse_point(p));
             let n = found.n_g.as_dvec3();
-            sides += usize::from(!inside(found.p - NUDGE * n) || inside(found.p + NUDGE * n));
+            sides.require(inside(found.p - NUDGE * n) && !inside(found.p + NUDGE * n), || {
+                format!("{}: {} with the normal {n}", case.name, found.p)
+            });
             if n.dot(ray.direction.as_dvec3()) < 0.0 {
                 let away = Ray::new((found.p + NUDGE * n).as_vec3(), -ray.direction);
-                back += usize::from(accel.intersect(&away).is_some());
+                back.require(accel.intersect(&away).is_none(), || format!("{}: {away:?}", case.name));
             }
         }
     }

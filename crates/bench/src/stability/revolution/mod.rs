@@ -8,7 +8,7 @@ use std::f64::consts::{PI, TAU};
 use self::roots::all_hits;
 use self::surfaces::{d3_equals_quadrics, d4_joints_and_poles, d5_spheroids_are_not_hit_again, d6_areas, d7_b_splines};
 use super::geometry::Rng;
-use super::{Effort, Outcome, vectors};
+use super::{Effort, Faults, Outcome, vectors};
 use crate::geometry::{Profile, Revolution};
 use crate::math::{DVec3, RayF64, dvec3};
 
@@ -122,10 +122,10 @@ fn compare_hits(seed: u64, rays: usize, mut compare: impl FnMut(usize, &Revoluti
 fn d1_all_roots_are_found(effort: Effort) -> Outcome {
     let per_kind = effort.pick(75, 6_000);
     let mut equal = [0usize; KINDS.len()];
-    let (mut odd, mut lost, mut invented) = (0, 0, 0);
-    compare_hits(51, per_kind, |kind, _, _, found, expected| {
+    let (mut odd, mut lost, mut invented) = (Faults::NONE, 0, 0);
+    compare_hits(51, per_kind, |kind, _, ray, found, expected| {
         equal[kind] += usize::from(found.len() == expected.len());
-        odd += (found.len() + expected.len()) % 2;
+        odd.add((found.len() + expected.len()) % 2, || format!("{ray:?} has {found:?} in place of {expected:?}"));
         lost += usize::from(found.len() < expected.len());
         invented += usize::from(found.len() > expected.len());
     });
@@ -183,7 +183,7 @@ fn d2_roots_are_accurate(effort: Effort) -> Outcome {
 }
 
 fn d8_stored_vectors(_: Effort) -> Outcome {
-    let (mut rays, mut excluded, mut unequal, mut oracle) = (0usize, 0, 0, 0);
+    let (mut rays, mut excluded, mut unequal, mut oracle) = (0usize, 0, Faults::NONE, Faults::NONE);
     let (mut distance, mut oracle_error) = (0f64, 0f64);
     let worst = |found: &[f64], exact: &[f64]| {
         found.iter().zip(exact).fold(0f64, |worst, (t, exact)| worst.max((t - exact).abs()))
@@ -195,8 +195,11 @@ fn d8_stored_vectors(_: Effort) -> Outcome {
             let ray = RayF64::from(&vector.ray);
             let (found, reference) = (hits_of(&shape, &ray), all_hits(points, &ray));
             rays += 1;
-            unequal += usize::from(found.len() != vector.hits.len());
-            oracle += usize::from(reference.len() != vector.hits.len());
+            for (faults, hits) in [(&mut unequal, &found), (&mut oracle, &reference)] {
+                faults.require(hits.len() == vector.hits.len(), || {
+                    format!("{ray:?} has {hits:?} in place of {:?}", vector.hits)
+                });
+            }
             if found.len() == vector.hits.len() {
                 distance = distance.max(worst(&found, &vector.hits) * ray.direction.length() / ray.origin.length());
             }
@@ -217,21 +220,22 @@ fn d8_stored_vectors(_: Effort) -> Outcome {
 fn d9_nearest_first(effort: Effort) -> Outcome {
     let mut rng = Rng::new(53);
     let shape = turned(LOOPING);
-    let (mut most, mut disordered, mut off, mut behind, mut lost) = (0, 0, 0f64, 0, 0);
+    let (mut most, mut off) = (0, 0f64);
+    let [mut disordered, mut behind, mut lost] = [const { Faults::NONE }; 3];
     for i in 0..effort.pick(6_000, 500_000) {
         let ray = test_ray(&mut rng, &shape, i % KINDS.len());
         let hits = hits_of(&shape, &ray);
         most = most.max(hits.len());
-        disordered += hits.windows(2).filter(|pair| pair[0] >= pair[1]).count();
+        let describe = || format!("{ray:?} has {hits:?}");
+        disordered.add(hits.windows(2).filter(|pair| pair[0] >= pair[1]).count(), describe);
         for &t in &hits {
             match shape.intersect(&RayF64 { t_min: t, ..ray }).filter(|hit| hit.t == t) {
                 Some(hit) => off = off.max((shape.surface(&ray, &hit).p - ray.at(t)).length()),
-                None => lost += 1,
+                None => lost.require(false, describe),
             }
         }
-        behind += usize::from(
-            shape.intersect(&endless(ray.origin + ray.direction.normalize() * 1e3, ray.direction)).is_some(),
-        );
+        let beyond = endless(ray.origin + ray.direction.normalize() * 1e3, ray.direction);
+        behind.require(shape.intersect(&beyond).is_none(), || format!("{beyond:?}"));
     }
     Outcome::new()
         .none("hits out of order", disordered)

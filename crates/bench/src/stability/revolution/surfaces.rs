@@ -46,14 +46,14 @@ pub(super) fn d3_equals_quadrics(effort: Effort) -> Outcome {
     }
 
     let ball = turned(CIRCLE);
-    let (mut missed, mut radial) = (0, 0f64);
+    let (mut missed, mut radial) = (Faults::NONE, 0f64);
     for _ in 0..effort.pick(10_000, 1_000_000) {
         let direction = rng.direction();
         let offset = rng.direction().cross(direction).normalize() * rng.range(0.0, 0.95);
         let ray = endless(offset - 3.0 * direction, direction);
         match ball.intersect(&ray) {
             Some(hit) => radial = radial.max((ball.surface(&ray, &hit).p.length() - 1.0).abs()),
-            None => missed += 1,
+            None => missed.require(false, || format!("{ray:?}")),
         }
     }
     Outcome::new()
@@ -70,7 +70,7 @@ pub(super) fn d3_equals_quadrics(effort: Effort) -> Outcome {
 pub(super) fn d4_joints_and_poles(effort: Effort) -> Outcome {
     let mut rng = Rng::new(56);
     let ball = turned(CIRCLE);
-    let (mut joints, mut poles, mut place) = (0, 0, 0f64);
+    let (mut joints, mut poles, mut place) = (Faults::NONE, Faults::NONE, 0f64);
     for i in 0..effort.pick(50_000, 1_000_000) {
         let (sin, cos) = rng.range(0.0, TAU).sin_cos();
         let from = rng.direction() * 0.5;
@@ -82,7 +82,8 @@ pub(super) fn d4_joints_and_poles(effort: Effort) -> Outcome {
         if i % 3 == 0 {
             (ray.origin.y, ray.direction.y) = (0.0, 0.0);
         }
-        joints += usize::from(hits_of(&ball, &ray).len() != 1);
+        let hits = hits_of(&ball, &ray);
+        joints.require(hits.len() == 1, || format!("{ray:?} has {hits:?}"));
     }
     // Exactly through the pole, and past it by less than the root of a rounding; along the axis and not.
     for i in 0..effort.pick(20_000, 300_000) {
@@ -91,8 +92,9 @@ pub(super) fn d4_joints_and_poles(effort: Effort) -> Outcome {
         if i % 3 == 0 {
             target.x = rng.magnitude(-16.0, -6.0);
         }
-        let hits = hits_of(&ball, &endless(from, target - from));
-        poles += usize::from(hits.len() != 1);
+        let ray = endless(from, target - from);
+        let hits = hits_of(&ball, &ray);
+        poles.require(hits.len() == 1, || format!("{ray:?} has {hits:?}"));
         place = hits.iter().fold(place, |worst, t| worst.max((t - 1.0).abs()));
     }
     Outcome::new()
@@ -104,7 +106,7 @@ pub(super) fn d4_joints_and_poles(effort: Effort) -> Outcome {
 
 pub(super) fn d5_spheroids_are_not_hit_again(effort: Effort) -> Outcome {
     let mut rng = Rng::new(57);
-    let (mut spawned, mut again) = (0usize, 0);
+    let (mut spawned, mut again) = (0usize, Faults::NONE);
     for radius in [1e-6, 1.0, 1e6] {
         for offset in [0.0, 1.0, 1e2, 1e4, 1e6] {
             for _ in 0..effort.pick(200, 10_000) {
@@ -123,7 +125,8 @@ pub(super) fn d5_spheroids_are_not_hit_again(effort: Effort) -> Outcome {
                         away = (away - n * away.dot(n)).normalize() + n * rng.magnitude(-5.0, -1.0);
                     }
                     spawned += 1;
-                    again += usize::from(accel.occluded(&at.spawn(away.as_vec3())));
+                    let leaving = at.spawn(away.as_vec3());
+                    again.require(!accel.occluded(&leaving), || format!("{leaving:?} after {ray:?}"));
                 }
             }
         }
@@ -162,7 +165,7 @@ pub(super) fn d6_areas(_: Effort) -> Outcome {
 
 pub(super) fn d7_b_splines(effort: Effort) -> Outcome {
     let mut rng = Rng::new(58);
-    let (mut error, mut joints, mut differ, mut hits) = (0f64, 0, 0, 0usize);
+    let (mut error, mut joints, mut differ, mut hits) = (0f64, Faults::NONE, Faults::NONE, 0usize);
     for _ in 0..effort.pick(100, 5_000) {
         let points: Vec<[f64; 2]> = (0..6).map(|_| [rng.range(0.1, 2.0), rng.range(-2.0, 2.0)]).collect();
         let spline = Profile::b_spline(&points).expect(VALID);
@@ -181,7 +184,8 @@ pub(super) fn d7_b_splines(effort: Effort) -> Outcome {
                 error = error.max((spline.point(segment as f64 + s) - expected).abs().max_element() / size);
             }
         }
-        joints += spline.segments().windows(2).filter(|pair| pair[0][3] != pair[1][0]).count();
+        let apart = spline.segments().windows(2).filter(|pair| pair[0][3] != pair[1][0]).count();
+        joints.add(apart, || format!("{points:?}"));
         let bezier: Vec<[f64; 2]> = spline
             .segments()
             .iter()
@@ -194,7 +198,7 @@ pub(super) fn d7_b_splines(effort: Effort) -> Outcome {
         for i in 0..20 {
             let ray = test_ray(&mut rng, &a, i % KINDS.len());
             let found = hits_of(&a, &ray);
-            differ += usize::from(found != hits_of(&b, &ray));
+            differ.require(found == hits_of(&b, &ray), || format!("{points:?}: {ray:?} has {found:?}"));
             hits += found.len();
         }
     }

@@ -4,7 +4,7 @@ use std::f64::consts::LN_2;
 
 use rayon::prelude::*;
 
-use super::super::{Effort, Outcome, Plot};
+use super::super::{Effort, Faults, Outcome, Plot};
 use super::materials::{ALPHAS, Material, coats, direction, glass, white, white_metal};
 use crate::bsdf::{
     Bsdf, Conductor, Dielectric, Eon, Lambert, Mirror, Plastic, Principled, PrincipledParameters, ThinDielectric,
@@ -60,7 +60,8 @@ pub(super) fn g5_energy(effort: Effort) -> Outcome {
             })
         })
         .collect();
-    let broken = found.iter().filter(|(albedo, _)| !(*albedo >= 0.0)).count();
+    let broken =
+        Faults::of(&found, |(albedo, _)| usize::from(!(*albedo >= 0.0)), |(albedo, name)| format!("{name}: {albedo}"));
     let worst = found.iter().max_by(|a, b| a.0.total_cmp(&b.0)).expect("there are materials");
     Outcome::new()
         .at_most(format!("largest albedo of {} ({})", found.len(), worst.1), worst.0, 1.01)

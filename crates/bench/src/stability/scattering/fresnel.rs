@@ -1,7 +1,7 @@
 //! Fresnel's equations against closed forms and complex arithmetic in `f64`.
 
 use super::super::geometry::Rng;
-use super::super::{Effort, Outcome};
+use super::super::{Effort, Faults, Outcome};
 use crate::bsdf::fresnel::{ComplexIndex, Refraction, dielectric, dielectric_average};
 
 /// Reflectance for an index `eta + i k`, from `(a + ib)^2 = (eta + ik)^2 - sin^2`.
@@ -41,7 +41,7 @@ fn error(found: f32, cos: f32, eta: f32, k: f32) -> f64 {
 pub(super) fn g9_fresnel(effort: Effort) -> Outcome {
     let mut rng = Rng::new(9);
     let (mut glass, mut metal, mut lossless, mut snell) = (0f64, 0f64, 0f64, 0f64);
-    let (mut total, mut out_of_range) = (0, 0);
+    let (mut total, mut out_of_range) = (Faults::NONE, Faults::NONE);
     for _ in 0..effort.pick(100_000, 10_000_000) {
         let cos = (1.0 - rng.unit_f32()).min(rng.magnitude(-4.0, 0.5) as f32).min(1.0);
         let eta = rng.magnitude(-1.0, 1.0) as f32;
@@ -51,10 +51,12 @@ pub(super) fn g9_fresnel(effort: Effort) -> Outcome {
         let k = rng.magnitude(-2.0, 1.0) as f32;
         let reflected = ComplexIndex::new(eta, k).reflectance(cos);
         metal = metal.max(error(reflected, cos, eta, k));
-        out_of_range += usize::from(!(0.0..=1.0).contains(&reflectance) || !(0.0..=1.0).contains(&reflected));
+        let describe =
+            || format!("cosine {cos:?}, index {eta:?} or {eta:?} + {k:?} i: {reflectance:?} or {reflected:?}");
+        out_of_range.require([reflectance, reflected].iter().all(|r| (0.0..=1.0).contains(r)), describe);
         let sin2_t = (1.0 - f64::from(cos).powi(2)) / f64::from(eta).powi(2);
         if sin2_t >= 1.0 + 1e-6 {
-            total += usize::from(reflectance != 1.0 || cos_t != 0.0);
+            total.require(reflectance == 1.0 && cos_t == 0.0, describe);
         } else {
             // Compared as squares: the root amplifies rounding next to the critical angle.
             snell = snell.max((f64::from(cos_t).powi(2) - (1.0 - sin2_t)).abs() / sin2_t.max(1.0));
@@ -71,7 +73,8 @@ pub(super) fn g9_fresnel(effort: Effort) -> Outcome {
     let metals = [[0.2, 3.9], [0.0, 1.0]].map(|[eta, k]| ComplexIndex::new(eta, k).reflectance(0.0));
     let grazing: Vec<f64> =
         glasses.into_iter().chain(metals).map(|reflectance| f64::from((1.0 - reflectance).abs())).collect();
-    out_of_range += usize::from(!(0.0..=1.0).contains(&ComplexIndex::new(0.0, 0.0).reflectance(1.0)));
+    let nothing = ComplexIndex::new(0.0, 0.0).reflectance(1.0);
+    out_of_range.require((0.0..=1.0).contains(&nothing), || format!("index 0: {nothing:?}"));
     let averages = [(1.5, 0.091_78), (1.0 / 1.5, 0.596_35), (1.0, 0.0)]
         .map(|(eta, average)| f64::from((dielectric_average(eta) - average).abs()));
     let largest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::super::geometry::Rng;
-use super::super::{Effort, Outcome, sidak_level};
+use super::super::{Effort, Faults, Outcome, sidak_level};
 use super::density::{compare, judge_directions, judge_integrals};
 use super::materials::{Material, View, corner, direction, glass, gold};
 use super::weights::{Weights, check_samples};
@@ -56,7 +56,7 @@ fn judge_smooth_limit(outcome: Outcome, effort: Effort) -> Outcome {
         (glass(1.5, [4e-4; 2]).bsdf, glass(1.5, [0.0; 2]).bsdf),
         (plastic([1e-4; 2]), plastic([0.0; 2])),
     ];
-    let deltas = pairs.iter().filter(|(rough, _)| rough.flags().is_delta()).count();
+    let deltas = Faults::of(&pairs, |(rough, _)| usize::from(rough.flags().is_delta()), |pair| format!("{:?}", pair.0));
     let cases = pairs.iter().flat_map(|pair| [1.0, 0.8, 0.4, -0.9, -0.5].map(|cos| (pair, direction(cos, 0.3))));
     let found: Vec<_> =
         cases.map(|((rough, smooth), wo)| welch(rough, smooth, wo, effort.pick(20_000, 1_000_000))).collect();
@@ -116,7 +116,8 @@ fn judge_corners(outcome: Outcome, effort: Effort) -> Outcome {
 }
 
 pub(super) fn g10_limits(effort: Effort) -> Outcome {
-    let broken: usize = (0..2048u32).into_par_iter().map(|bits| unsound(&corner(bits).bsdf)).sum();
+    let corners: Vec<u32> = (0..2048).collect();
+    let broken = Faults::of(&corners, |&bits| unsound(&corner(bits).bsdf), |&bits| corner(bits).name);
     let outcome = Outcome::new().none("values at 2048 corners that are no numbers or negative", broken);
     judge_corners(judge_smooth_limit(outcome, effort), effort)
 }

@@ -1,8 +1,8 @@
 //! BSDFs of every kind, and directions to look at them from.
 
 use crate::bsdf::{
-    Bsdf, Coat, Coated, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Phong, Plastic,
-    Principled, PrincipledParameters, ThinDielectric,
+    Beckmann, Bsdf, Coat, Coated, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Phong,
+    Plastic, Principled, PrincipledParameters, SeparableGgx, SingleScatteringBsdf, ThinDielectric,
 };
 use crate::color::Rgb;
 use crate::math::{Vec3, sin_cos_turns, vec3};
@@ -110,6 +110,32 @@ fn blends() -> Vec<Material> {
         Material { ior, ..Material::new(format!("principled {name}"), principled(&p)) }
     };
     list.into_iter().map(material).collect()
+}
+
+/// Metal and glass of other distributions of facets, which lose what is scattered several times.
+pub fn single_scattering() -> Vec<Material> {
+    let (eta, k) = (Rgb::new(0.18, 0.42, 1.37), Rgb::new(3.42, 2.35, 1.77));
+    let gold = || Conductor::new(eta, k, [0.0; 2], Rgb::WHITE);
+    let of = |alpha: [f32; 2]| {
+        let metal = gold().with_facets(Beckmann::new(alpha), Rgb::WHITE);
+        let separable = gold().with_facets(SeparableGgx::new(alpha), Rgb::WHITE);
+        let glass = Dielectric::with_facets(1.5, alpha, Beckmann::new);
+        [
+            Material::new(format!("Beckmann gold {alpha:?}"), Bsdf::Beckmann(SingleScatteringBsdf::Conductor(metal))),
+            Material::new(
+                format!("separable gold {alpha:?}"),
+                Bsdf::SeparableGgx(SingleScatteringBsdf::Conductor(separable)),
+            ),
+            Material {
+                ior: 1.5,
+                ..Material::new(
+                    format!("Beckmann glass {alpha:?}"),
+                    Bsdf::Beckmann(SingleScatteringBsdf::Dielectric(glass)),
+                )
+            },
+        ]
+    };
+    [[0.125; 2], [0.3, 0.15], [0.5; 2]].into_iter().flat_map(of).collect()
 }
 
 /// Coloured materials of every kind that has a density.

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::super::{Effort, Outcome, sidak_level};
+use super::super::{Effort, Faults, Outcome, sidak_level};
 use super::materials::{ALPHAS, direction};
 use crate::bsdf::{Ggx, Microfacets};
 use crate::math::{Vec3, sin_cos_turns, vec3};
@@ -122,7 +122,10 @@ pub(super) fn g8_visible_normals(effort: Effort) -> Outcome {
             densities.iter().copied().fold(1.0, f64::min),
             sidak_level(densities.len()),
         )
-        .none("normals that are no unit vectors of the upper side", found.iter().map(|n| n.broken).sum::<usize>())
+        .none(
+            "normals that are no unit vectors of the upper side",
+            Faults::of(&found, |normals| normals.broken, |normals| normals.name.clone()),
+        )
         .at_least("least cosine with the direction", found.iter().map(|n| n.least_cos).fold(1.0, f64::min), 0.0)
         .record("fraction of normals seen from behind", hidden);
     if worst.p_value >= level {

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::super::geometry::Rng;
 use super::super::render::{Estimate, merge, pixels, probe, render};
-use super::super::{Effort, Outcome};
+use super::super::{Effort, Faults, Outcome};
 use crate::integrator::{adapt_shading_normal, terminator_factor};
 use crate::math::Vec3;
 
@@ -71,10 +71,16 @@ fn cases() -> impl Iterator<Item = (bool, Value, [f64; 3])> {
 /// Pixels that are not black where all light comes from below the quad but from above the plane of its shading normal.
 /// Only with a normal map: vertex normals approximate a smooth surface, which may see below the plane of a facet that
 /// nothing covers.
-fn leaks() -> usize {
+fn leaks() -> Faults {
     let below = json!([{ "type": "directional", "direction": [-0.95, 0, 0.3], "irradiance": [9, 9, 9] }]);
     let lit = |(by_map, material, from)| render(&scene(from, 4, tilted(70.0, by_map, material), below.clone()));
-    cases().filter(|case| case.0).map(|case| pixels(&lit(case)).filter(|p| *p != [0.0; 3]).count()).sum()
+    let mut leaks = Faults::NONE;
+    for case in cases().filter(|case| case.0) {
+        leaks.add(pixels(&lit(case.clone())).filter(|p| *p != [0.0; 3]).count(), || {
+            format!("{} from {:?}", case.1, case.2)
+        });
+    }
+    leaks
 }
 
 /// Largest step of the radiance of a leaning white quad from one height of the light to the next, times the number of
@@ -99,16 +105,18 @@ fn steepest(effort: Effort) -> f64 {
 const COARSE: u32 = 2_000;
 
 /// Values of the terminator's factor outside of [0, 1], or smaller for more light, and its largest slope.
-fn factor(effort: Effort) -> (usize, f64) {
+fn factor(effort: Effort) -> (Faults, f64) {
     let steps = effort.pick(2_000, 100_000u32);
-    let (mut wrong, mut slope) = (0, 0f64);
+    let (mut wrong, mut slope) = (Faults::NONE, 0f64);
     for cos_normals in [0.01f32, 0.17, 0.5, 0.9, 1.0] {
         let (mut last, mut last_coarse) = (0.0, 0.0);
         for i in 0..=steps {
             // The factor depends on the cosine to the surface over this product.
             let part = 1.2 * i as f32 / steps as f32 - 0.1;
             let factor = terminator_factor(part * 0.8 * cos_normals, 0.8, cos_normals);
-            wrong += usize::from(!((0.0..=1.0).contains(&factor) && factor >= last - 1e-6));
+            wrong.require((0.0..=1.0).contains(&factor) && factor >= last - 1e-6, || {
+                format!("{factor:?} after {last:?}, cosine of the normals {cos_normals}, part {part:?}")
+            });
             last = factor;
             // Over steps so coarse that the rounding of the factor does not count.
             if i % (steps / COARSE) == 0 {
@@ -121,17 +129,18 @@ fn factor(effort: Effort) -> (usize, f64) {
 }
 
 /// Mirror reflections that leave through the surface, for random normals and directions.
-fn reflected_below(effort: Effort) -> usize {
+fn reflected_below(effort: Effort) -> Faults {
     let mut rng = Rng::new(11);
     let random = |rng: &mut Rng| rng.direction().as_vec3();
-    let below = |rng: &mut Rng| {
-        let (back, mut n_s) = (random(rng), random(rng));
+    let mut below = Faults::NONE;
+    for _ in 0..effort.pick(200_000, 5_000_000) {
+        let (back, mut n_s) = (random(&mut rng), random(&mut rng));
         n_s.z = n_s.z.abs();
         let n = adapt_shading_normal(back, n_s, Vec3::Z);
         let reflected = 2.0 * back.dot(n) * n - back;
-        usize::from(!(reflected.z * back.z > 0.0 && back.dot(n) * back.z > 0.0))
-    };
-    (0..effort.pick(200_000, 5_000_000)).map(|_| below(&mut rng)).sum()
+        below.require(reflected.z * back.z > 0.0 && back.dot(n) * back.z > 0.0, || format!("{back} off {n_s}"));
+    }
+    below
 }
 
 pub(super) fn g11_shading_normals(effort: Effort) -> Outcome {

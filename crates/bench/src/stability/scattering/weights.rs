@@ -1,8 +1,8 @@
 //! Weights of samples, and reciprocity.
 
 use super::super::geometry::Rng;
-use super::super::{Effort, Outcome};
-use super::materials::{Material, direction, rough, smooth};
+use super::super::{Effort, Faults, Outcome};
+use super::materials::{Material, direction, rough, single_scattering, smooth};
 use crate::bsdf::Bsdf;
 use crate::math::Vec3;
 
@@ -52,7 +52,7 @@ pub struct Weights {
     /// Where that is.
     pub worst: String,
     /// Samples on another side than that of their lobe, or by a lobe that is a delta and yet has a density.
-    pub wrong: usize,
+    pub wrong: Faults,
 }
 
 /// Draws samples of one material and adds what is found.
@@ -67,7 +67,7 @@ pub fn check_samples(found: &mut Weights, material: &Material, count: usize, rng
             (true, true) => material.ior,
             (true, false) => 1.0 / material.ior,
         };
-        found.wrong += usize::from(!side || s.eta != eta);
+        found.wrong.require(side && s.eta == eta, || format!("{} from {wo}: {s:?}", material.name));
         if s.is_delta {
             continue;
         }
@@ -86,7 +86,7 @@ pub fn check_samples(found: &mut Weights, material: &Material, count: usize, rng
 
 impl Weights {
     /// The measures of G3.
-    pub fn judge(&self, outcome: Outcome) -> Outcome {
+    pub fn judge(self, outcome: Outcome) -> Outcome {
         outcome
             .at_most(
                 format!("relative difference beyond what rounding the direction by 2^-22 changes ({})", self.worst),
@@ -101,7 +101,7 @@ impl Weights {
 pub(super) fn g3_weights(effort: Effort) -> Outcome {
     let mut rng = Rng::new(3);
     let mut found = Weights::default();
-    for material in rough().into_iter().chain(smooth()) {
+    for material in rough().into_iter().chain(smooth()).chain(single_scattering()) {
         check_samples(&mut found, &material, effort.pick(10_000, 200_000), &mut rng);
     }
     found.judge(Outcome::new())

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Effort, Leavings, NAMES, Outcome, accelerators, leaving};
+use super::{Effort, Faults, Leavings, NAMES, Outcome, accelerators, leaving};
 use crate::accel::{self, AccelKind, Accelerator};
 use crate::geometry::{Analytic, Disk, Frustum, Geometry, Profile, Quad, Revolution, Shape, Sphere, TransformedShape};
 use crate::math::float::step_past;
@@ -107,21 +107,21 @@ fn squares(half: f64, z: f64) -> [Shape; 2] {
 
 pub(super) fn b9_quads(effort: Effort) -> Outcome {
     let mut rng = Rng::new(9);
-    let (mut rays, mut again, mut occluded) = (0, 0, 0);
+    let (mut rays, mut again, mut occluded) = (0, Faults::NONE, Faults::NONE);
     for i in 0..effort.pick(100, 2_000) {
         // At height 0 the rounding of the point to f32 gives no distance.
         let (half, z) = (rng.magnitude(-2.0, 3.0), if i % 4 == 0 { 0.0 } else { rng.range(-400.0, 400.0) });
         for shape in squares(half, z) {
             let geometry = world(vec![shape]);
-            for (_, accel) in accelerators(&geometry) {
+            for (name, accel) in accelerators(&geometry) {
                 for _ in 0..100 {
                     let target = DVec3::new(half * rng.range(-1.0, 1.0), half * rng.range(-1.0, 1.0), z);
                     let primary = ray_through(target + half * rng.direction() * rng.magnitude(-1.0, 2.0), target);
                     let Some(si) = closest(&*accel, &geometry, &primary).found else { continue };
                     let on = si.spawn(primary.direction);
                     rays += 1;
-                    again += usize::from(closest(&*accel, &geometry, &on).found.is_some());
-                    occluded += usize::from(accel.occluded(&on));
+                    again.require(closest(&*accel, &geometry, &on).found.is_none(), || format!("{name}: {on:?}"));
+                    occluded.require(!accel.occluded(&on), || format!("{name}: {on:?}"));
                 }
             }
         }
@@ -155,13 +155,14 @@ pub(super) fn b11_continue(effort: Effort) -> Outcome {
         for (geometry, shapes) in [(analytic, "quads"), (triangles, "triangles")] {
             for (kind, name) in AccelKind::ALL {
                 let accel = accel::build(kind, &geometry, 1).expect("accelerators build");
-                let mut wrong = 0;
+                let mut wrong = Faults::NONE;
                 for _ in 0..effort.pick(100, 5_000) {
                     // Close planes are met straight on, where distances are their heights.
                     let across = if spacing < 1.0 { DVec3::ZERO } else { 0.5 * rng.cube() * (DVec3::X + DVec3::Y) };
                     let from = 10.0 * rng.cube() * (DVec3::X + DVec3::Y);
-                    let order = met(&*accel, &ray(from, DVec3::Z + across), 2 * COUNT);
-                    wrong += usize::from(!order.iter().copied().eq(0..COUNT as u32));
+                    let ray = ray(from, DVec3::Z + across);
+                    let order = met(&*accel, &ray, 2 * COUNT);
+                    wrong.require(order.iter().copied().eq(0..COUNT as u32), || format!("{ray:?} meets {order:?}"));
                 }
                 outcome = outcome.none(format!("{shapes} {what}, {name}: rays that miss one or meet one twice"), wrong);
             }

@@ -66,9 +66,9 @@ pub(super) fn i1_furnaces(effort: Effort) -> Outcome {
 }
 
 pub(super) fn i2_depth(effort: Effort) -> Outcome {
-    let spp = effort.pick(16, 1024);
+    let spp = effort.pick(64, 1024);
     let mut tests = Tests::new();
-    for depth in [1, 2, 3, 4, 5, 8] {
+    for depth in [1, 2, 3, 4, 5, 8, 64] {
         let expected = 1.0 - 0.5f64.powi(depth);
         for rr_depth in [1, 100] {
             for strategy in STRATEGIES {
@@ -84,7 +84,7 @@ pub(super) fn i2_depth(effort: Effort) -> Outcome {
         }
     }
     // What one bounce more or less changes at depth 8.
-    tests.judge_means(Outcome::new(), effort.pick(0.035, 0.0039))
+    tests.judge_means(Outcome::new(), effort.pick(0.018, 0.0039))
 }
 
 pub(super) fn i11_seen_directly(_: Effort) -> Outcome {

@@ -1,6 +1,8 @@
 //! Layers with holes, and cards that move.
 
-use super::{Effort, Outcome, PIXELS, SIDE, Tests, Value, json, merge, pixels, prepare, render, render_with, scene};
+use super::{
+    Effort, Faults, Outcome, PIXELS, SIDE, Tests, Value, json, merge, pixels, prepare, render, render_with, scene,
+};
 use crate::accel::{AccelKind, EmbreeOptions, EmbreeQuality};
 use crate::render::Overrides;
 use crate::stability::render::Estimate;
@@ -121,11 +123,11 @@ pub(super) fn i10_motion(effort: Effort) -> Outcome {
 
     // With both steps the same nothing moves.
     let still: Vec<_> = pixels(&render(&before_a_sky(16, json!({ "shapes": [card()] })))).collect();
-    let different = moving(0.0).into_iter().map(|(_, rest)| {
+    let mut different = Faults::NONE;
+    for (name, rest) in moving(0.0) {
         let image = render(&before_a_sky(16, rest));
-        pixels(&image).zip(&still).filter(|(a, b)| a != *b).count()
-    });
-    let different: usize = different.sum();
+        different.add(pixels(&image).zip(&still).filter(|(a, b)| a != *b).count(), || name.to_owned());
+    }
     let outcome = Outcome::new().none("pixels of cards with two equal steps that differ from those at rest", different);
     tests.judge_means(outcome, effort.pick(1.0, 0.15))
 }

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::render::{Estimate, merge, pixels, prepare, render, render_with};
 use super::verdict::Tests;
-use super::{Effort, Outcome};
+use super::{Effort, Faults, Outcome};
 
 use drift::i12_drift;
 use furnaces::{i1_furnaces, i2_depth, i11_seen_directly};
@@ -25,8 +25,8 @@ checks! {
         "closed sphere of albedo 1/2 that emits 1/2, or with one or four point lights of pi in all: radiance 1, with \
          every sampler and camera, 32 x 32 pixels (pbrt, integrators_test)";
     "I2" i2_depth "depth":
-        "the same sphere with up to k = 1 to 8 segments: 1 - 2^-k, with roulette from the first bounce and without, by \
-         every strategy";
+        "the same sphere with up to k = 1 to 8 and 64 segments: 1 - 2^-k, with roulette from the first bounce and \
+         without, by every strategy";
     "I3" i3_white_furnace "white convex objects in white surroundings":
         "sphere, or cube, of every material at its whitest under a sky of radiance 1: it vanishes (Heitz), within what \
          docs/materials.md says of tabulated energies";
