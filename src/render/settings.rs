@@ -426,7 +426,7 @@ mod tests {
             ("time_limit", Overrides { time_limit: Some(0.0), ..d() }),
             ("time_limit", Overrides { time_limit: Some(f64::NAN), ..d() }),
             ("layers", Overrides { layers: vec![LayerKind::Z], outputs: vec!["a.png".to_owned()], ..d() }),
-            ("float", Overrides { float: true, outputs: vec!["a.png".to_owned()], ..d() }),
+            ("float", Overrides { float: Some(true), outputs: vec!["a.png".to_owned()], ..d() }),
             ("exposure", Overrides { exposure: Some(1.0), outputs: vec!["a.exr".to_owned()], ..d() }),
             ("exposure", Overrides { exposure: Some(f32::INFINITY), ..d() }),
             ("view", Overrides { view: Some(ViewDesc::Agx), outputs: vec!["a.exr".to_owned()], ..d() }),
