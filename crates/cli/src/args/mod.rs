@@ -334,7 +334,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "SECONDS", help_heading = "Run")]
     pub time_limit: Option<f64>,
     /// Write statistics as JSON to this file; - for stdout
-    #[arg(long, value_name = "FILE", help_heading = "Run")]
+    // Scripts know it by its earlier name.
+    #[arg(long, alias = "json", value_name = "FILE", help_heading = "Run")]
     pub stats: Option<PathBuf>,
     /// Replay samples of this pixel alone and print their values; nothing is written
     #[arg(long, value_name = "X,Y", value_parser = parse_list::<u32, 2>, requires = "sample", hide = true)]

@@ -50,6 +50,7 @@ fn every_option_reaches_the_overrides() {
     assert_eq!((o.caustics, o.guiding), (Some(CausticsDesc::Photons), Some(true)));
     assert!(o.regularize == Some(0.2) && o.no_depth_of_field && o.transparent == Some(true));
     assert_eq!((arguments.verbosity.verbose, arguments.verbosity.quiet), (2, false));
+    assert_eq!(render(&["--json", "a.json"]).unwrap().stats, Some("a.json".into()));
 }
 
 #[test]

@@ -37,8 +37,7 @@ const OPTIONS: [(&str, &str); 27] = [
 ];
 
 /// Options of earlier versions: the command, the option, and what replaces it.
-const RENAMED: [(&str, &str, &str); 15] = [
-    ("render", "--json", "--stats FILE"),
+const RENAMED: [(&str, &str, &str); 14] = [
     ("render", "--exr-profile", "--exr profile=NAME"),
     ("render", "--compression", "--exr compression=NAME"),
     ("render", "--dwa-level", "--exr dwa_level=LEVEL"),
