@@ -8,20 +8,22 @@
 
 mod directions;
 mod quadtree;
+mod space;
 mod state;
 #[cfg(test)]
 mod tests;
 
 pub use directions::{DirectionDistribution, GuideSample, PdfLookup, SampleLookup};
 pub use quadtree::DirectionRecords;
+pub use space::Place;
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::prefetch::prefetch;
 use crate::math::random::hash64;
 use crate::math::{Aabb, Vec3};
+use space::{MAX_DEPTH, Node, SpaceTrees};
 
 /// Records of a leaf beyond which it is divided, after one sample per pixel; after `n` it is `sqrt(n)` times as many.
 const RECORDS_TO_DIVIDE: f64 = 4000.0;
@@ -36,11 +38,8 @@ const MAX_SPATIAL_NODES: usize = 2 * MAX_LEAVES - ROOTS;
 /// much while they are refined.
 const MAX_NODES: usize = 1 << 20;
 
-/// Nodes of a single distribution at most: its indices have 16 bits.
-const MAX_NODES_OF_LEAF: usize = 1024;
-
-/// Divisions of space in a row at most.
-const MAX_DEPTH: u32 = 48;
+/// Nodes of a single distribution at most: each divides a cell in four.
+const MAX_NODES_OF_LEAF: usize = (directions::MAX_CELLS - 1) / 3;
 
 /// Whole numbers that a typical record is worth.
 const UNITS: f32 = 65_536.0;
@@ -55,72 +54,14 @@ const BSDF_SAMPLING_FRACTION: f32 = 0.5;
 /// when a path meets it.
 const OTHER_FRACTIONS: [f32; 4] = [0.3, 0.4, 0.7, 0.9];
 
-/// A node of the tree over space: the index of the first of two children or, with [`IS_LEAF`], that of a leaf. Small,
-/// for paths look it up at every vertex.
-#[derive(Clone, Copy, Debug)]
-struct Node(u32);
-
-const IS_LEAF: u32 = 1 << 31;
-
-/// Divisions of each axis that the table of starts has.
-const START_BITS: u32 = 4;
-
-/// Divisions in a row that lookups skip by the table.
-const START_DEPTH: u32 = 3 * START_BITS;
-
 /// Trees over space, one for each side that surfaces face.
 const ROOTS: usize = 6;
-
-/// Where lookups in a part of space start: a leaf above [`START_DEPTH`], or the node there.
-#[derive(Clone, Copy, Debug, Default)]
-struct Start {
-    node: u32,
-    depth: u32,
-}
-
-/// The starts of all parts of space, by the divisions that lead there.
-fn starts(nodes: &[Node]) -> Vec<Start> {
-    let mut starts = Vec::with_capacity(ROOTS << START_DEPTH);
-    let mut open: Vec<Start> = (0..ROOTS as u32).rev().map(|node| Start { node, depth: 0 }).collect();
-    while let Some(start) = open.pop() {
-        let Start { node, depth } = start;
-        if depth == START_DEPTH || nodes[node as usize].leaf().is_some() {
-            starts.extend(std::iter::repeat_n(start, 1 << (START_DEPTH - depth)));
-        } else {
-            let first = nodes[node as usize].0;
-            open.extend([first + 1, first].map(|node| Start { node, depth: depth + 1 }));
-        }
-    }
-    starts
-}
-
-/// The first divisions that lead to a point of the unit cube, and where in the part of space it is.
-#[inline]
-fn divisions(at: Vec3) -> (usize, [f32; 3]) {
-    let scaled = (at * (1 << START_BITS) as f32).to_array();
-    let cell = scaled.map(|x| x as i32);
-    // Every third bit.
-    let spread = |x: i32| {
-        let x = (x | x << 4) & 0x0c3;
-        (x | x << 2) & 0x249
-    };
-    let path = spread(cell[0]) << 2 | spread(cell[1]) << 1 | spread(cell[2]);
-    (path as usize, [0, 1, 2].map(|k| scaled[k] - cell[k] as f32))
-}
-
-impl Node {
-    /// The leaf, if it is one.
-    #[inline]
-    fn leaf(self) -> Option<usize> {
-        (self.0 & IS_LEAF != 0).then_some((self.0 & !IS_LEAF) as usize)
-    }
-}
 
 /// What has been learned of a part of space. Apart from what is being learned: a thread that writes one would slow down
 /// those that read the other.
 #[derive(Clone, Debug)]
 struct Region {
-    directions: Option<Arc<DirectionDistribution>>,
+    directions: Option<DirectionDistribution>,
     bsdf_sampling_fraction: f32,
 }
 
@@ -170,9 +111,8 @@ pub struct Record {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RecordLeaf {
     at: Vec3,
-    root: usize,
+    root: u32,
     leaf: usize,
-    depth: u32,
 }
 
 /// The learned distribution of incident radiance over a scene, and the records of the next one.
@@ -181,10 +121,7 @@ pub struct Guide {
     /// Of the box around the scene, a cube.
     corner: Vec3,
     inverse_size: f32,
-    /// The first [`ROOTS`] are roots.
-    nodes: Vec<Node>,
-    /// Of `nodes`.
-    starts: Vec<Start>,
+    trees: SpaceTrees,
     learned: Vec<Region>,
     leaves: Vec<Leaf>,
     /// From light to whole numbers.
@@ -199,14 +136,12 @@ impl Guide {
         let mut guide = Self {
             corner: Vec3::ZERO,
             inverse_size: 0.0,
-            nodes: (0..ROOTS as u32).map(|leaf| Node(leaf | IS_LEAF)).collect(),
-            starts: Vec::new(),
+            trees: SpaceTrees::undivided(),
             learned: vec![Region { directions: None, bsdf_sampling_fraction: BSDF_SAMPLING_FRACTION }; ROOTS],
             leaves: (0..ROOTS).map(|_| Leaf::default()).collect(),
             scale: scale_of(typical),
             learns: true,
         };
-        guide.starts = starts(&guide.nodes);
         guide.set_bounds(bounds);
         guide
     }
@@ -246,13 +181,19 @@ impl Guide {
 
     /// What is known of the light at a surface whose normal, on the side of the path, is `n`; `None` if nothing.
     pub fn at(&self, p: Vec3, n: Vec3) -> Option<GuideRegion<'_>> {
-        self.region(self.find_region(p, n))
+        self.region(self.find_region(self.place(p, n)))
     }
 
-    /// The number of the [region](Self::region) of a surface; it is being loaded then.
+    /// Where a surface is in the trees over space.
+    #[inline(always)]
+    pub fn place(&self, p: Vec3, n: Vec3) -> Place {
+        Place::new(root(n), self.normalized(p))
+    }
+
+    /// The number of the [region](Self::region) around a surface; it is being loaded then.
     #[inline]
-    pub fn find_region(&self, p: Vec3, n: Vec3) -> u32 {
-        let region = self.find(root(n), self.normalized(p)).0;
+    pub fn find_region(&self, place: Place) -> u32 {
+        let region = self.trees.find(place);
         prefetch(&self.learned, region);
         region as u32
     }
@@ -261,7 +202,7 @@ impl Guide {
     #[inline]
     pub fn region(&self, region: u32) -> Option<GuideRegion<'_>> {
         let learned = &self.learned[region as usize];
-        let directions = learned.directions.as_deref()?;
+        let directions = learned.directions.as_ref()?;
         Some(GuideRegion { directions, bsdf_sampling_fraction: learned.bsdf_sampling_fraction })
     }
 
@@ -274,9 +215,9 @@ impl Guide {
     #[inline]
     pub fn find_leaf(&self, record: &Record) -> RecordLeaf {
         let (at, root) = (self.normalized(record.p), root(record.n));
-        let (leaf, depth) = self.find(root, at);
+        let leaf = self.trees.find(Place::new(root, at));
         prefetch(&self.leaves, leaf);
-        RecordLeaf { at, root, leaf, depth }
+        RecordLeaf { at, root, leaf }
     }
 
     /// Starts to load the records of a leaf.
@@ -289,7 +230,7 @@ impl Guide {
     #[inline]
     pub fn record_in(&self, leaf: &RecordLeaf, record: &Record) {
         let Record { direction, light, densities, .. } = *record;
-        let RecordLeaf { at, root, leaf, depth } = *leaf;
+        let RecordLeaf { at, root, leaf } = *leaf;
         self.leaves[leaf].count.fetch_add(1, Ordering::Relaxed);
         if !(light > 0.0 && light < f32::INFINITY && direction.is_finite()) {
             return;
@@ -311,11 +252,12 @@ impl Guide {
         }
 
         // Moved by up to half a leaf: what leaves learn does not jump at their borders then.
+        let depth = self.trees.depth(leaf);
         let size = |divisions: u32| f32::from_bits((127 - divisions) << 23);
         let jitter = |k: u32| size((depth + 2 - k) / 3) * (unit(first >> (20 * k)) - 0.5);
         let moved = at + Vec3::new(jitter(0), jitter(1), jitter(2));
         let is_inside = moved.min_element() >= 0.0 && moved.max_element() < 1.0;
-        let leaf = if is_inside { self.find(root, moved).0 } else { leaf };
+        let leaf = if is_inside { self.trees.find(Place::new(root, moved)) } else { leaf };
         self.leaves[leaf].records.add(direction, [unit(second), unit(second >> 32)], amount as u64);
     }
 
@@ -323,25 +265,26 @@ impl Guide {
     #[must_use]
     pub fn refined(&self, samples: u32) -> Self {
         let most_records = (RECORDS_TO_DIVIDE * f64::from(samples).sqrt()) as u64;
-        let (starts, learned, leaves) = (Vec::new(), Vec::new(), Vec::new());
-        let mut next = Self { nodes: self.nodes.clone(), starts, learned, leaves, ..*self };
-        let depths = self.depths();
+        let mut nodes = self.trees.nodes().to_vec();
+        let (mut learned, mut next_leaves) = (Vec::new(), Vec::new());
         let mut plans = Vec::new();
-        for (index, leaf) in self.nodes.iter().enumerate().filter_map(|(index, node)| Some((index, node.leaf()?))) {
-            let leaf = &self.leaves[leaf];
-            plans.push((leaf, next.divide(index, depths[index], leaf.count.load(Ordering::Relaxed), most_records)));
+        for (index, node) in self.trees.nodes().iter().enumerate() {
+            let Some(number) = node.leaf() else { continue };
+            let leaf = &self.leaves[number];
+            let count = leaf.count.load(Ordering::Relaxed);
+            plans.push((leaf, divide(&mut nodes, index, self.trees.depth(number), count, most_records)));
         }
         let leaves: usize = plans.iter().map(|(_, parts)| parts.len()).sum();
         let most_nodes = (MAX_NODES / leaves.max(1)).min(MAX_NODES_OF_LEAF);
         for (leaf, parts) in plans {
-            let directions = leaf.records.directions().map(Arc::new);
+            let directions = leaf.records.directions();
             let records = leaf.records.refined(most_nodes, parts.len());
             let (count, bsdf_sampling_fraction) =
                 (leaf.count.load(Ordering::Relaxed) / parts.len() as u64, leaf.best_share());
             for &part in &parts {
-                next.nodes[part] = Node(next.leaves.len() as u32 | IS_LEAF);
-                next.learned.push(Region { directions: directions.clone(), bsdf_sampling_fraction });
-                next.leaves.push(Leaf {
+                nodes[part] = Node::of_leaf(next_leaves.len());
+                learned.push(Region { directions: directions.clone(), bsdf_sampling_fraction });
+                next_leaves.push(Leaf {
                     records: records.copied(),
                     count: AtomicU64::new(count),
                     // What was better before need not be it for what is known now.
@@ -350,34 +293,7 @@ impl Guide {
                 });
             }
         }
-        next.starts = self::starts(&next.nodes);
-        next
-    }
-
-    /// Divides a leaf with `count` records until its parts have few enough; returns the nodes of the parts.
-    fn divide(&mut self, index: usize, depth: u32, count: u64, most: u64) -> Vec<usize> {
-        if count <= most || depth >= MAX_DEPTH || self.nodes.len() >= MAX_SPATIAL_NODES {
-            return vec![index];
-        }
-        let first = self.nodes.len();
-        self.nodes.extend([Node(IS_LEAF); 2]);
-        self.nodes[index] = Node(first as u32);
-        let mut parts = self.divide(first, depth + 1, count / 2, most);
-        parts.extend(self.divide(first + 1, depth + 1, count / 2, most));
-        parts
-    }
-
-    /// The depth of every node. Children come after their parents.
-    fn depths(&self) -> Vec<u32> {
-        let mut depths = vec![0; self.nodes.len()];
-        for (index, node) in self.nodes.iter().enumerate() {
-            if node.leaf().is_none() {
-                let first = node.0 as usize;
-                depths[first] = depths[index] + 1;
-                depths[first + 1] = depths[index] + 1;
-            }
-        }
-        depths
+        Self { trees: SpaceTrees::of_nodes(nodes), learned, leaves: next_leaves, ..*self }
     }
 
     /// Parts of space that have their own distribution.
@@ -391,7 +307,7 @@ impl Guide {
     }
 
     /// A point within the unit cube.
-    #[inline]
+    #[inline(always)]
     fn normalized(&self, p: Vec3) -> Vec3 {
         let inside = |k: usize| {
             let x = (p[k] - self.corner[k]) * self.inverse_size;
@@ -400,26 +316,20 @@ impl Guide {
         };
         Vec3::new(inside(0), inside(1), inside(2))
     }
+}
 
-    /// The leaf around a point of the unit cube, and its depth.
-    #[inline]
-    fn find(&self, root: usize, at: Vec3) -> (usize, u32) {
-        let (path, mut at) = divisions(at);
-        let Start { node, mut depth } = self.starts[root << START_DEPTH | path];
-        let (mut index, mut axis) = (node as usize, 0);
-        loop {
-            let node = self.nodes[index];
-            if let Some(leaf) = node.leaf() {
-                return (leaf, depth);
-            }
-            let x = 2.0 * at[axis];
-            let upper = x >= 1.0;
-            at[axis] = if upper { x - 1.0 } else { x };
-            index = node.0 as usize + usize::from(upper);
-            axis = if axis == 2 { 0 } else { axis + 1 };
-            depth += 1;
-        }
+/// Divides a leaf with `count` records until its parts have few enough; returns the nodes of the parts.
+fn divide(nodes: &mut Vec<Node>, index: usize, depth: u32, count: u64, most: u64) -> Vec<usize> {
+    if count <= most || depth >= MAX_DEPTH || nodes.len() >= MAX_SPATIAL_NODES {
+        return vec![index];
     }
+    let first = nodes.len();
+    // Leaves until they are divided themselves.
+    nodes.extend([Node::of_leaf(0); 2]);
+    nodes[index] = Node(first as u32);
+    let mut parts = divide(nodes, first, depth + 1, count / 2, most);
+    parts.extend(divide(nodes, first + 1, depth + 1, count / 2, most));
+    parts
 }
 
 /// Whole numbers per light; zero if nothing is known of the light.
@@ -429,9 +339,17 @@ fn scale_of(typical: f32) -> f32 {
 }
 
 /// The tree for surfaces with this normal: walls have two sides, and light below a surface does not reach it.
-#[inline]
-fn root(n: Vec3) -> usize {
+#[inline(always)]
+fn root(n: Vec3) -> u32 {
     let a = n.abs();
-    let axis = if a.x >= a.y && a.x >= a.z { 0 } else { 1 + usize::from(a.y < a.z) };
-    2 * axis + usize::from(n[axis] < 0.0)
+    let is_x = (a.x >= a.y) & (a.x >= a.z);
+    let axis = if is_x { 0 } else { 1 + u32::from(a.y < a.z) };
+    let component = if is_x {
+        n.x
+    } else if a.y < a.z {
+        n.z
+    } else {
+        n.y
+    };
+    2 * axis + u32::from(component < 0.0)
 }

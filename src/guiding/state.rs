@@ -1,10 +1,10 @@
 //! Guides as bytes and back. What is read may come from anywhere: a guide that could not have been learned is rejected.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 
 use super::{
-    DirectionDistribution, DirectionRecords, Guide, Leaf, MAX_LEAVES, MAX_NODES_OF_LEAF, Node, ROOTS, Region, starts,
+    DirectionDistribution, DirectionRecords, Guide, Leaf, MAX_DEPTH, MAX_LEAVES, MAX_NODES_OF_LEAF, Node, ROOTS,
+    Region, SpaceTrees,
 };
 use crate::bytes::{ByteReader, ByteWriter};
 use crate::math::Aabb;
@@ -27,20 +27,20 @@ impl Clone for Guide {
             gains: leaf.gains.each_ref().map(|gain| AtomicI64::new(gain.load(Ordering::Relaxed))),
         };
         let leaves = self.leaves.iter().map(copy).collect();
-        let (nodes, starts, learned) = (self.nodes.clone(), self.starts.clone(), self.learned.clone());
-        Self { nodes, starts, learned, leaves, ..*self }
+        let (trees, learned) = (self.trees.clone(), self.learned.clone());
+        Self { trees, learned, leaves, ..*self }
     }
 }
 
 impl Guide {
     /// Writes all but the bounds, and whether it learns.
     pub fn write(&self, out: &mut ByteWriter) {
-        out.integers(&self.nodes.iter().map(|node| node.0).collect::<Vec<_>>());
+        out.integers(&self.trees.nodes().iter().map(|node| node.0).collect::<Vec<_>>());
         out.integers(&[self.scale.to_bits()]);
-        let mut last: Option<&Arc<DirectionDistribution>> = None;
+        let mut last: Option<&DirectionDistribution> = None;
         for (learned, leaf) in self.learned.iter().zip(&self.leaves) {
             let own = learned.directions.as_ref();
-            let is_shared = own.zip(last).is_some_and(|(own, last)| Arc::ptr_eq(own, last));
+            let is_shared = own.zip(last).is_some_and(|(own, last)| own.is_same(last));
             let place = if is_shared { directions::SHARED } else { own.map_or(directions::NONE, |_| directions::OWN) };
             out.integers(&[place, learned.bsdf_sampling_fraction.to_bits()]);
             if let Some(own) = own.filter(|_| !is_shared) {
@@ -55,8 +55,9 @@ impl Guide {
 
     /// Reads what [`write`](Self::write) gave; `None` if it is no guide. The bounds are still to be set, and it learns.
     pub fn read(data: &mut ByteReader) -> Option<Self> {
-        let mut guide = Self { nodes: data.integers()?.into_iter().map(Node).collect(), ..Self::new(Aabb::EMPTY, 0.0) };
-        let leaves = count_leaves(&guide.nodes).filter(|count| *count <= MAX_LEAVES)?;
+        let nodes: Vec<Node> = data.integers()?.into_iter().map(Node).collect();
+        let leaves = count_leaves(&nodes).filter(|count| *count <= MAX_LEAVES)?;
+        let mut guide = Self { trees: SpaceTrees::of_nodes(nodes), ..Self::new(Aabb::EMPTY, 0.0) };
         let [scale] = data.integers()?.try_into().ok()?;
         guide.scale = Some(f32::from_bits(scale)).filter(|scale| (0.0..f32::INFINITY).contains(scale))?;
         guide.learned.clear();
@@ -70,7 +71,6 @@ impl Guide {
                 [data.long()?, data.long()?, data.long()?, data.long()?].map(|gain| AtomicI64::new(gain as i64));
             guide.leaves.push(Leaf { records, count, gains });
         }
-        guide.starts = starts(&guide.nodes);
         Some(guide)
     }
 }
@@ -80,18 +80,19 @@ fn read_learned(data: &mut ByteReader, last: Option<&Region>) -> Option<Region> 
     let directions = match place {
         directions::NONE => None,
         directions::SHARED => Some(last?.directions.clone()?),
-        directions::OWN => Some(Arc::new(DirectionDistribution::read(data)?)),
+        directions::OWN => Some(DirectionDistribution::read(data)?),
         _ => return None,
     };
     let bsdf_sampling_fraction = Some(f32::from_bits(share)).filter(|share| *share > 0.0 && *share < 1.0)?;
     Some(Region { directions, bsdf_sampling_fraction })
 }
 
-/// The leaves of the trees over space; `None` if these are not six binary trees with each leaf once.
+/// The leaves of the trees over space; `None` if these are not six binary trees with each leaf once, none too deep.
 fn count_leaves(nodes: &[Node]) -> Option<usize> {
     let leaves = nodes.iter().filter(|node| node.leaf().is_some()).count();
     let mut is_met = vec![false; leaves];
     let mut is_child = vec![false; nodes.len()];
+    let mut depths = vec![0; nodes.len()];
     for (index, node) in nodes.iter().enumerate() {
         match node.leaf() {
             Some(leaf) if std::mem::replace(is_met.get_mut(leaf)?, true) => return None,
@@ -99,9 +100,11 @@ fn count_leaves(nodes: &[Node]) -> Option<usize> {
             None => {
                 let first = node.0 as usize;
                 let pair = is_child.get_mut(first..first.checked_add(2)?).filter(|_| first > index.max(ROOTS - 1))?;
-                if std::mem::replace(&mut pair[0], true) || std::mem::replace(&mut pair[1], true) {
+                let depth = depths[index] + 1;
+                if depth > MAX_DEPTH || std::mem::replace(&mut pair[0], true) || std::mem::replace(&mut pair[1], true) {
                     return None;
                 }
+                depths[first..first + 2].fill(depth);
             }
         }
     }

@@ -122,14 +122,19 @@ soa! {
 }
 
 soa! {
+    /// The BSDFs of vertices for directions that were chosen elsewhere.
+    pub(super) struct EvalRows {
+        /// The direction, in the frame.
+        wi: Vec3,
+        value: Rgb,
+        /// The density with which scattering chooses the direction.
+        pdf: f32,
+    }
+}
+
+soa! {
     /// Direct light at vertices, and the shadow rays to it.
     pub(super) struct DirectRows {
-        /// The direction of the light sample, in the frame.
-        wi: Vec3,
-        /// The BSDF for it,
-        value: Rgb,
-        /// and the density of finding it by scattering.
-        scatter_pdf: f32,
         /// See [`spawn`].
         status: u32,
         shadow_origin: Vec3,
@@ -204,6 +209,8 @@ pub(super) struct Vertices {
     pub points: PointRows,
     pub analytic: AnalyticScratch,
     pub light_samples: LightSampleRows,
+    /// For the directions of `light_samples`.
+    pub light_evals: EvalRows,
     pub direct: DirectRows,
     pub scatter: ScatterRows,
     /// Paths of the block that leave the scene.

@@ -1,19 +1,19 @@
 //! Direct light: a light and a point of it for each vertex, weighted by MIS, and the shadow rays.
 
 use super::Context;
-use super::block::{DirectRows, PointRows, VertexRows, Vertices, spawn, vertex_flags};
+use super::block::{DirectRows, EvalRows, PointRows, VertexRows, Vertices, spawn, vertex_flags};
+use super::evals::Surfaces;
 use super::guided::{self, Regions};
 use super::terminator::{self, TerminatorRays};
-use super::wave::{BsdfScratch, Wave};
-use crate::bsdf::Lambert;
+use super::wave::Wave;
 use crate::geometry::SpawnPoint;
 use crate::integrator::Strategy;
 use crate::integrator::shading::terminator_factor;
 use crate::integrator::vertex::HemisphereTest;
 use crate::light::{LightContext, LightQueries, LightQueue, LightSampleRows, light_target};
+use crate::math::Vec3;
 use crate::math::rows::BATCH;
 use crate::math::vectorize::vectorize;
-use crate::math::{Frame, Vec3};
 use crate::sampling::power_heuristic;
 
 /// Samples light for the vertices of a block, and finds the shadow rays.
@@ -25,12 +25,15 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
         return;
     }
     choose_lights(context, vertices, light_queue);
-    vectorize!(eval_diffuse(&vertices.rows, &vertices.light_samples, &mut vertices.direct, count));
-    eval_non_diffuse(context, vertices, bsdf_rows);
+    let Vertices { rows, light_samples: lights, light_evals, bsdfs, non_diffuse, .. } = &mut *vertices;
+    let surfaces = Surfaces { scene: context.scene, count, rows, bsdfs, non_diffuse };
+    let is_wanted = |lane: usize| lights.target[lane] != light_target::NONE;
+    surfaces.eval(&lights.direction, is_wanted, bsdf_rows, light_evals);
     if let Some(regions) = regions {
         guided::mix_scatter_pdfs(regions, vertices);
     }
-    let Vertices { rows, points, light_samples: lights, direct, .. } = &mut *vertices;
+    let Vertices { rows, points, light_samples, light_evals: evals, direct, .. } = &mut *vertices;
+    let lights = (&*light_samples, &*evals);
     let is_mis = context.config.strategy == Strategy::Mis;
     if context.scene.features.normal_perturbations {
         vectorize!(illuminate::<true>(rows, points, lights, direct, is_mis, count));
@@ -44,30 +47,6 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
         wave.counts.shadow += super::media::trace_shadow_rays(context, vertices, media, block);
     } else if context.scene.features.media {
         super::media::absorb_direct(context, vertices, media, block);
-    }
-}
-
-/// Evaluates the BSDFs that are not diffuse towards the lights.
-fn eval_non_diffuse(context: &Context, vertices: &mut Vertices, rows: &mut BsdfScratch) {
-    let Vertices { rows: vertex, light_samples: lights, direct, non_diffuse, bsdfs, .. } = vertices;
-    let BsdfScratch { lanes, queries, evals, .. } = rows;
-    for group in bsdfs.groups(non_diffuse) {
-        lanes.clear();
-        lanes.extend(group.iter().filter(|&&lane| lights.target[usize::from(lane)] != light_target::NONE));
-        let Some(bsdf) = lanes.first().and_then(|&lane| bsdfs.get(context.scene, usize::from(lane))) else { continue };
-        for (i, &lane) in lanes.iter().enumerate() {
-            queries.wo.set(i, vertex.wo.get(usize::from(lane)));
-            queries.wi.set(i, direct.wi.get(usize::from(lane)));
-        }
-        let varies = bsdfs.varies(usize::from(lanes[0]));
-        if varies {
-            bsdfs.set_parameters(context.scene, lanes, queries);
-        }
-        bsdf.eval_rows(queries, varies, lanes.len(), evals);
-        for (i, &lane) in lanes.iter().enumerate() {
-            direct.value.set(usize::from(lane), evals.value.get(i));
-            direct.scatter_pdf[usize::from(lane)] = evals.pdf[i];
-        }
     }
 }
 
@@ -98,22 +77,10 @@ fn choose_lights(context: &Context, vertices: &mut Vertices, queue: &mut LightQu
 }
 
 #[inline(always)]
-fn eval_diffuse(rows: &VertexRows, lights: &LightSampleRows, direct: &mut DirectRows, count: usize) {
-    for i in 0..count.min(BATCH) {
-        let frame = Frame { x: rows.frame_x.get(i), y: rows.frame_y.get(i), z: rows.n.get(i) };
-        let wi = frame.to_local(lights.direction.get(i));
-        let eval = Lambert { albedo: rows.albedo.get(i) }.eval(rows.wo.get(i), wi);
-        direct.wi.set(i, wi);
-        direct.value.set(i, eval.value);
-        direct.scatter_pdf[i] = eval.pdf;
-    }
-}
-
-#[inline(always)]
 fn illuminate<const PERTURBED: bool>(
     rows: &VertexRows,
     points: &PointRows,
-    lights: &LightSampleRows,
+    (lights, evals): (&LightSampleRows, &EvalRows),
     direct: &mut DirectRows,
     is_mis: bool,
     count: usize,
@@ -121,12 +88,12 @@ fn illuminate<const PERTURBED: bool>(
     for i in 0..count.min(BATCH) {
         let direction = lights.direction.get(i);
         let cos = direction.dot(rows.n_g.get(i));
-        let cos_local = direct.wi.0[2][i];
+        let cos_local = evals.wi.0[2][i];
         let test = HemisphereTest::new([rows.wo.0[2][i], cos_local], [rows.cos_geometric[i], cos]);
         let factor = shadowing::<PERTURBED>(test, [cos, cos_local, rows.cos_normals[i]]);
         let pdf = lights.pdf[i];
-        let weight = if is_mis & (lights.is_delta[i] == 0) { power_heuristic(pdf, direct.scatter_pdf[i]) } else { 1.0 };
-        let value = direct.value.get(i) * factor;
+        let weight = if is_mis & (lights.is_delta[i] == 0) { power_heuristic(pdf, evals.pdf[i]) } else { 1.0 };
+        let value = evals.value.get(i) * factor;
         let contribution = rows.throughput.get(i) * value * lights.radiance.get(i) * (weight / pdf);
         direct.contribution.set(i, contribution);
         let is_lit = (lights.target[i] != light_target::NONE) & !contribution.is_black();

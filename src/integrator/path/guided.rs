@@ -2,15 +2,16 @@
 //! records that it is learned from.
 
 use super::Context;
-use super::block::{Vertices, spawn, vertex_flags};
+use super::block::{EvalRows, Vertices, spawn, vertex_flags};
+use super::evals::Surfaces;
 use super::radiance::Output;
-use super::wave::PathRows;
+use super::wave::{BsdfScratch, PathRows};
 use crate::color::Rgb;
-use crate::guiding::{Guide, GuideRegion, GuideSample, PdfLookup, Record, RecordLeaf};
+use crate::guiding::{Guide, GuideRegion, PdfLookup, Place, Record, RecordLeaf};
 use crate::light::light_target;
 use crate::math::float::ONE_MINUS_EPSILON;
-use crate::math::prefetch::prefetch;
-use crate::math::rows::BATCH;
+use crate::math::rows::{BATCH, Row, Vec3Rows};
+use crate::math::vectorize::vectorize;
 
 /// Largest ratio of the density of a direction to that of the BSDF alone which roulette disregards.
 const MAX_PDF_RATIO: f32 = 1e6;
@@ -48,15 +49,27 @@ pub(super) struct GuideRecorder {
     vertices: Vec<GuideVertex>,
     /// How many of them have their `radiance_before`.
     marked: usize,
-    /// By vertex of the block: the direction that the guide has sampled, with its density.
-    sampled: [Option<GuideSample>; BATCH],
+    /// By vertex of the block: whether the guide has sampled the direction, the direction, and its density.
+    is_sampled: Row<bool>,
+    directions: Vec3Rows,
+    guide_pdf: Row,
+    /// For these directions.
+    evals: EvalRows,
     /// By vertex of the block: the densities of the BSDF and of the guide.
     densities: [Option<[f32; 2]>; BATCH],
 }
 
 impl Default for GuideRecorder {
     fn default() -> Self {
-        Self { vertices: Vec::new(), marked: 0, sampled: [None; BATCH], densities: [None; BATCH] }
+        Self {
+            vertices: Vec::new(),
+            marked: 0,
+            is_sampled: [false; BATCH],
+            directions: Vec3Rows::ZERO,
+            guide_pdf: [0.0; BATCH],
+            evals: EvalRows::default(),
+            densities: [None; BATCH],
+        }
     }
 }
 
@@ -72,20 +85,28 @@ pub(super) type Regions<'a> = [Option<GuideRegion<'a>>; BATCH];
 /// Finds the regions of a block's vertices. Here and below, loops begin lookups in one pass and finish them in the
 /// next: all lanes wait for memory together.
 pub(super) fn find_regions<'a>(guide: &'a Guide, vertices: &Vertices) -> Regions<'a> {
+    let mut places = [Place::default(); BATCH];
+    vectorize!(find_places(guide, vertices, &mut places));
     let mut numbers = [0; BATCH];
     let lanes = || (0..vertices.count.min(BATCH)).filter(|&lane| is_guided(vertices, lane));
     for lane in lanes() {
-        numbers[lane] = guide.find_region(vertices.points.p.get(lane).as_vec3(), vertices.facing_normal(lane));
+        numbers[lane] = guide.find_region(places[lane]);
     }
     let mut regions = [None; BATCH];
     for lane in lanes() {
         regions[lane] = guide.region(numbers[lane]);
         if let Some(region) = &regions[lane] {
-            prefetch(std::slice::from_ref(region.directions), 0);
+            region.directions.prefetch();
         }
     }
-    regions.iter().flatten().for_each(|region| region.directions.prefetch());
     regions
+}
+
+#[inline(always)]
+fn find_places(guide: &Guide, vertices: &Vertices, places: &mut [Place; BATCH]) {
+    for (lane, place) in places.iter_mut().enumerate().take(vertices.count) {
+        *place = guide.place(vertices.points.p.get(lane).as_vec3(), vertices.facing_normal(lane));
+    }
 }
 
 /// The density of a direction that the BSDF and the guide choose with these.
@@ -96,7 +117,7 @@ fn mixed(region: &GuideRegion, [bsdf, guide]: [f32; 2]) -> f32 {
 
 /// Replaces the densities with which scattering finds the lights' directions.
 pub(super) fn mix_scatter_pdfs(regions: &Regions, vertices: &mut Vertices) {
-    let Vertices { light_samples, direct, count, .. } = vertices;
+    let Vertices { light_samples, light_evals, count, .. } = vertices;
     let chosen = || (0..*count).filter_map(|lane| Some((lane, regions[lane].as_ref()?)));
     let mut lookups = [PdfLookup::default(); BATCH];
     for (lane, region) in chosen().filter(|&(lane, _)| light_samples.target[lane] != light_target::NONE) {
@@ -104,7 +125,7 @@ pub(super) fn mix_scatter_pdfs(regions: &Regions, vertices: &mut Vertices) {
     }
     for (lane, region) in chosen().filter(|&(lane, _)| light_samples.target[lane] != light_target::NONE) {
         let guide_pdf = region.directions.finish_pdf(&lookups[lane]);
-        direct.scatter_pdf[lane] = mixed(region, [direct.scatter_pdf[lane], guide_pdf]);
+        light_evals.pdf[lane] = mixed(region, [light_evals.pdf[lane], guide_pdf]);
     }
 }
 
@@ -128,17 +149,24 @@ impl GuideRecorder {
             }
         }
         for (lane, lookup) in lookups.iter().enumerate().take(vertices.count) {
-            let region = lookup.as_ref().zip(regions[lane].as_ref());
-            self.sampled[lane] = region.map(|(lookup, region)| region.directions.finish_sample(lookup));
+            self.is_sampled[lane] = false;
+            let Some((lookup, region)) = lookup.as_ref().zip(regions[lane].as_ref()) else { continue };
+            let sample = region.directions.finish_sample(lookup);
+            self.is_sampled[lane] = true;
+            self.directions.set(lane, sample.direction);
+            self.guide_pdf[lane] = sample.pdf;
         }
     }
 
     /// Replaces the BSDF's samples by those of the guide, and all densities by those of both together.
-    pub fn mix(&mut self, context: &Context, regions: &Regions, vertices: &mut Vertices) {
+    pub fn mix(&mut self, context: &Context, regions: &Regions, vertices: &mut Vertices, scratch: &mut BsdfScratch) {
+        let Vertices { rows, bsdfs, non_diffuse, count, .. } = &*vertices;
+        let surfaces = Surfaces { scene: context.scene, count: *count, rows, bsdfs, non_diffuse };
+        surfaces.eval(&self.directions, |lane| self.is_sampled[lane], scratch, &mut self.evals);
         let mut lookups = [None; BATCH];
         for (lane, region) in regions.iter().enumerate().take(vertices.count) {
             let scatter = &vertices.scatter;
-            let is_of_bsdf = self.sampled[lane].is_none() && scatter.is_valid[lane] != 0 && scatter.is_delta[lane] == 0;
+            let is_of_bsdf = !self.is_sampled[lane] && scatter.is_valid[lane] != 0 && scatter.is_delta[lane] == 0;
             if let (Some(region), true) = (region, is_of_bsdf) {
                 let direction = vertices.frame(lane).to_world(scatter.wi.get(lane));
                 lookups[lane] = Some(region.directions.begin_pdf(direction));
@@ -147,17 +175,16 @@ impl GuideRecorder {
         for (lane, region) in regions.iter().enumerate().take(vertices.count) {
             self.densities[lane] = None;
             let Some(region) = region else { continue };
-            if let Some(GuideSample { direction, pdf: guide_pdf }) = self.sampled[lane] {
-                let wi = vertices.frame(lane).to_local(direction);
-                let eval = vertices.eval(context.scene, lane, wi);
-                let densities = [eval.pdf, guide_pdf];
+            if self.is_sampled[lane] {
+                let (value, bsdf_pdf) = (self.evals.value.get(lane), self.evals.pdf[lane]);
+                let densities = [bsdf_pdf, self.guide_pdf[lane]];
                 let pdf = mixed(region, densities);
                 let scatter = &mut vertices.scatter;
-                scatter.wi.set(lane, wi);
-                scatter.weight.set(lane, eval.value * (1.0 / pdf));
+                scatter.wi.set(lane, self.evals.wi.get(lane));
+                scatter.weight.set(lane, value * (1.0 / pdf));
                 scatter.pdf[lane] = pdf;
-                scatter.rr_factor[lane] = (pdf / eval.pdf).min(MAX_PDF_RATIO);
-                scatter.is_valid[lane] = u32::from(!eval.value.is_black());
+                scatter.rr_factor[lane] = (pdf / bsdf_pdf).min(MAX_PDF_RATIO);
+                scatter.is_valid[lane] = u32::from(!value.is_black());
                 (scatter.is_delta[lane], scatter.is_transmission[lane]) = (0, 0);
                 self.densities[lane] = Some(densities);
                 continue;

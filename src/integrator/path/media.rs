@@ -190,7 +190,7 @@ fn direct_share(context: &Context, vertices: &Vertices, lane: usize, state: &Med
     let id = LightId(lights.light[lane]);
     let pmf = context.scene.lights.pmf(id, &vertices.light_context(lane), context.compensation);
     let is_mis = context.config.strategy == Strategy::Mis && lights.is_delta[lane] == 0;
-    let phase = if is_mis { vertices.direct.scatter_pdf[lane] } else { 0.0 };
+    let phase = if is_mis { vertices.light_evals.pdf[lane] } else { 0.0 };
     arrival.share(context, id, DirectionPdfs { light: lights.pdf[lane] / pmf, phase })
 }
 

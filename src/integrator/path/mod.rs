@@ -12,6 +12,7 @@ mod continuations;
 mod direct;
 mod emission;
 mod equiangular;
+mod evals;
 mod guided;
 mod light_aovs;
 mod materials;

@@ -27,7 +27,7 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
     vectorize!(sample_diffuse(rows, scatter, u_bsdf, count));
     sample_non_diffuse(context, vertices, bsdf_rows);
     if let Some(regions) = regions {
-        guided.mix(context, regions, vertices);
+        guided.mix(context, regions, vertices, bsdf_rows);
     }
     let Vertices { rows, points, scatter, u_bsdf, .. } = &mut *vertices;
     let continuations = context.pass.continuations;

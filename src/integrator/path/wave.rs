@@ -265,7 +265,7 @@ impl Wave {
         let lanes = Compaction::equal(&direct.status, spawn::SPAWNED, *count);
         if context.config.needs_light_aovs() {
             for lane in (0..BATCH).filter(|&lane| lanes.contains(lane)) {
-                let lobes = || self.vertices.lobes(context.scene, lane, direct.wi.get(lane));
+                let lobes = || self.vertices.lobes(context.scene, lane, self.vertices.light_evals.wi.get(lane));
                 let event = self.light_aovs.shadow_event(context, block * BATCH + self.vertices.path(lane), lobes);
                 self.light_aovs.shadow_sources.push((event, LightId(self.vertices.light_samples.light[lane])));
             }

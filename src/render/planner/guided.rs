@@ -3,7 +3,7 @@
 //! Later iterations are better than earlier ones, so they are averaged with [`IterationWeights`].
 
 use super::iteration_weights::{IterationWeights, mean};
-use super::training_schedule::{is_refinement, iteration_end, iteration_start, next_refinement};
+use super::training_schedule::{is_refinement, iteration_end, iteration_start, last_refinement, next_refinement};
 use crate::bytes::{ByteReader, ByteWriter};
 use crate::error::Result;
 use crate::film::Film;
@@ -51,7 +51,7 @@ impl GuidedPlanner {
         let mut end = iteration_end(done);
         if let Some(guide) = &mut self.guide {
             let refinement = next_refinement(done);
-            guide.set_learning(refinement < spp);
+            guide.set_learning(refinement <= last_refinement(spp));
             end = end.min(refinement);
         }
         end.saturating_sub(done)
@@ -59,7 +59,7 @@ impl GuidedPlanner {
 
     /// Every pixel has `done` samples: refines the guide and ends the iteration, if that is due.
     pub fn complete_samples(&mut self, film: &mut Film, done: u32, spp: u32) {
-        if let Some(guide) = self.guide.as_mut().filter(|_| is_refinement(done) && done < spp) {
+        if let Some(guide) = self.guide.as_mut().filter(|_| is_refinement(done) && done <= last_refinement(spp)) {
             *guide = guide.refined(done);
             if !guide.has_radiance_scale() {
                 guide.set_typical(mean(&self.iteration) as f32);

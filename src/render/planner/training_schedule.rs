@@ -5,7 +5,7 @@
 const FIRST_ITERATION: u32 = 2;
 
 /// How often the guide is refined while the samples double, at most.
-const REFINEMENTS: u64 = 4;
+const REFINEMENTS: u32 = 4;
 
 /// The first sample of the iteration that the sample with this index belongs to: each has as many samples as all before
 /// it.
@@ -20,11 +20,15 @@ pub(super) fn iteration_end(sample: u32) -> u32 {
 
 /// The next refinement of a guide after `done` samples per pixel, the first after one.
 pub(super) fn next_refinement(done: u32) -> u32 {
-    let mut next = 1u64;
-    while next <= u64::from(done) {
-        next += (next / REFINEMENTS).max(1);
-    }
-    u32::try_from(next).unwrap_or(u32::MAX)
+    let Some(octave) = done.checked_ilog2() else { return 1 };
+    let step = ((1 << octave) / REFINEMENTS).max(1);
+    (done / step * step).saturating_add(step)
+}
+
+/// Samples after which a guide of a render with `spp` samples per pixel is no longer refined: what the last half would
+/// learn does not pay for its records.
+pub(super) fn last_refinement(spp: u32) -> u32 {
+    spp / 2
 }
 
 /// Whether a guide is refined after `done` samples per pixel.
@@ -42,7 +46,7 @@ mod tests {
         assert_eq!(starts, [0, 0, 2, 2, 4, 4, 4, 4, 8, 8]);
         assert_eq!([0, 1, 2, 3, 4, 9, u32::MAX].map(iteration_end), [2, 2, 4, 4, 8, 16, u32::MAX]);
         let refinements: Vec<u32> = (0..64).filter(|&done| is_refinement(done)).collect();
-        assert_eq!(refinements, [1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 15, 18, 22, 27, 33, 41, 51, 63]);
+        assert_eq!(refinements, [1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56]);
         for done in [0, 1, 7, 8, 9, 63, 1000, u32::MAX - 1] {
             assert!(next_refinement(done) > done);
         }
