@@ -58,7 +58,8 @@ case "${1:-render}" in
         cargo run --release --locked --package steradian-cli --no-default-features -- render scenes/gallery.json -o gallery.exr -o gallery.png
         echo "The picture: $PWD/gallery.png (for a screen) and $PWD/gallery.exr (linear, for compositing)" >&2
         ;;
-    test) cargo test --locked ;;
+    # With the features of the Python module's dependencies, so that CI compiles the library once.
+    test) cargo test --locked --workspace --exclude xtask --exclude steradian-benches ;;
     install)
         # With the instructions of this machine, if it has them (AVX2 and others): a few per cent faster, with the same pictures.
         loader=/lib64/ld-linux-x86-64.so.2

@@ -119,6 +119,15 @@ def test_meshes_of_arrays_are_those_of_lists():
     assert np.array_equal(*pictures) and pictures[0][..., :3].std() > 0.01
 
 
+def test_numbers_are_read_as_the_nearest(tmp_path):
+    digits = np.random.default_rng(3)
+    numbers = (digits.uniform(1, 10, 3000) * 10.0 ** digits.integers(-30, 30, 3000)).tolist()
+    mesh = {"type": "mesh", "positions": [[x, 0, 0] for x in numbers], "triangles": [[0, 1, 2]]}
+    file = tmp_path / "scene.json"
+    file.write_text(json.dumps(ball(shapes=[mesh])))
+    assert [x for x, _, _ in st.load(file)["shapes[0].positions"]] == numbers
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -5,15 +5,25 @@ use std::path::Path;
 use std::process::ExitCode;
 
 mod api;
+#[cfg(feature = "tools")]
 mod bake_energy;
+#[cfg(feature = "tools")]
 mod bench_scenes;
+#[cfg(feature = "tools")]
 mod compare_refs;
+#[cfg(feature = "tools")]
 mod eval_materials;
+#[cfg(feature = "tools")]
 mod light_choice;
+#[cfg(feature = "tools")]
 mod make_meshes;
+#[cfg(feature = "tools")]
 mod make_textures;
+#[cfg(feature = "tools")]
 mod make_vectors;
+#[cfg(feature = "tools")]
 mod mutants;
+#[cfg(feature = "tools")]
 mod texture_filtering;
 
 type Outcome = Result<(), Box<dyn Error>>;
@@ -39,12 +49,10 @@ fn root() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
 }
 
-fn main() -> ExitCode {
-    let mut words = std::env::args().skip(1);
-    let name = words.next().unwrap_or_default();
-    let words: Vec<String> = words.collect();
-    let outcome = match name.as_str() {
-        "api" => api::run(&words),
+/// What needs the library or other crates; nothing if no tool has this name.
+#[cfg(feature = "tools")]
+fn run_tool(name: &str, words: Vec<String>) -> Option<Outcome> {
+    Some(match name {
         "bake_energy" => bake_energy::run(),
         "bench_scenes" => bench_scenes::run(),
         "compare_refs" => compare_refs::run(words),
@@ -58,20 +66,36 @@ fn main() -> ExitCode {
             texture_filtering::run();
             Ok(())
         }
+        _ => return None,
+    })
+}
+
+#[cfg(not(feature = "tools"))]
+fn run_tool(_: &str, _: Vec<String>) -> Option<Outcome> {
+    None
+}
+
+fn main() -> ExitCode {
+    let mut words = std::env::args().skip(1);
+    let name = words.next().unwrap_or_default();
+    let words: Vec<String> = words.collect();
+    let outcome = match name.as_str() {
+        "api" => Some(api::run(&words)),
         "-h" | "--help" => {
             print!("{USAGE}");
-            Ok(())
+            Some(Ok(()))
         }
-        _ => {
-            eprint!("{USAGE}");
-            return ExitCode::from(2);
-        }
+        _ => run_tool(&name, words),
     };
     match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
+        Some(Ok(())) => ExitCode::SUCCESS,
+        Some(Err(error)) => {
             eprintln!("xtask {name}: {error}");
             ExitCode::FAILURE
+        }
+        None => {
+            eprint!("{USAGE}");
+            ExitCode::from(2)
         }
     }
 }

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use super::Faults;
 use crate::accel::{self, AccelKind};
 use crate::film::Image;
 use crate::render::{self, Overrides, RenderResult, Settings, Silent};
@@ -89,6 +90,17 @@ impl Estimate {
 pub fn pixels(image: &Image) -> impl Iterator<Item = [f32; 3]> + '_ {
     let [width, height] = image.size;
     (0..height).flat_map(move |y| (0..width).filter_map(move |x| image.rgb(x, y)))
+}
+
+/// The numbers of a picture that are not finite.
+pub fn not_finite(image: &Image) -> Faults {
+    let mut faults = Faults::NONE;
+    for layer in &image.layers {
+        for (i, value) in layer.data.iter().enumerate() {
+            faults.require(value.is_finite(), || format!("number {i} of layer {:?} is {value}", layer.kind));
+        }
+    }
+    faults
 }
 
 /// A white diffuse floor at y = 0 seen from above at `at`: its radiance times pi is the irradiance.

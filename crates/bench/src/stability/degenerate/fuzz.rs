@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use super::{Effort, Outcome};
+use super::{Effort, Faults, Outcome};
 use crate::compile;
 use crate::render::{Overrides, Settings};
 use crate::stability::geometry::Rng;
@@ -102,16 +102,22 @@ type Reader<'a> = dyn Fn(&[u8]) -> Result<(), String> + 'a;
 struct Tally {
     read: usize,
     refused: usize,
-    silent: usize,
-    unread: usize,
+    /// Refused without a reason.
+    silent: Faults,
+    /// Refused without a mutation.
+    unread: Faults,
     slowest: f64,
 }
 
 impl Tally {
     /// Feeds `count` mutations of `seeds` to a reader.
     fn of(rng: &mut Rng, count: usize, seeds: &[&str], read: &Reader<'_>) -> Self {
-        let unread = seeds.iter().filter(|seed| read(seed.as_bytes()).is_err()).count();
-        let mut tally = Self { unread, ..Self::default() };
+        let mut tally = Self::default();
+        for seed in seeds {
+            if let Err(message) = read(seed.as_bytes()) {
+                tally.unread.add(1, || format!("{message}: {seed}"));
+            }
+        }
         for i in 0..count {
             let mut bytes = seeds[i % seeds.len()].as_bytes().to_vec();
             for _ in 0..=rng.below(3) {
@@ -122,7 +128,7 @@ impl Tally {
                 Ok(()) => tally.read += 1,
                 Err(message) => {
                     tally.refused += 1;
-                    tally.silent += usize::from(message.trim().is_empty());
+                    tally.silent.require(!message.trim().is_empty(), || String::from_utf8_lossy(&bytes).into_owned());
                 }
             }
             tally.slowest = tally.slowest.max(start.elapsed().as_secs_f64());
@@ -134,8 +140,8 @@ impl Tally {
         outcome
             .record(format!("{what} read"), self.read as f64)
             .record(format!("{what} refused"), self.refused as f64)
-            .none(format!("{what} refused as they are"), self.unread)
-            .none(format!("{what} refused without a reason"), self.silent)
+            .none(format!("{what} refused as they are"), self.unread.clone())
+            .none(format!("{what} refused without a reason"), self.silent.clone())
             .record(format!("seconds of the slowest of {what}"), self.slowest)
     }
 }
@@ -168,4 +174,20 @@ pub(super) fn e10_mutated_files(effort: Effort) -> Outcome {
     parts.into_iter().fold(Outcome::new(), |outcome, (what, count, seeds, read)| {
         Tally::of(&mut rng, count, seeds, read).report(outcome, what)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refusal_without_a_reason_and_one_without_a_mutation_are_counterexamples() {
+        let silent = |bytes: &[u8]| if bytes == b"seed" { Ok(()) } else { Err(String::new()) };
+        let tally = Tally::of(&mut Rng::new(1), 20, &["seed"], &silent);
+        assert!(tally.silent.count > 0 && tally.silent.first.is_some_and(|text| text != "seed"));
+        assert_eq!(tally.unread.count, 0);
+        let strict = |_: &[u8]| Err("no".to_owned());
+        let tally = Tally::of(&mut Rng::new(1), 20, &["seed"], &strict);
+        assert_eq!((tally.unread.first.as_deref(), tally.silent.count), (Some("no: seed"), 0));
+    }
 }

@@ -1,5 +1,6 @@
 //! Scenes of no, one and many shapes, one after the other and side by side.
 
+use super::rays::hits;
 use super::{Effort, Faults, Outcome};
 use crate::accel::{AccelKind, Accelerator, EmbreeAccel, EmbreeOptions, EmbreeQuality, LinearAccel};
 use crate::bumpy_sphere;
@@ -31,20 +32,17 @@ fn differing(geometry: &Geometry, rays: &[Ray]) -> Faults {
     wrong
 }
 
-/// Hits in scenes without a shape.
-fn hits_of_nothing(rays: &[Ray]) -> usize {
+/// Hits in scenes without a shape, and bounds of such scenes.
+fn hits_of_nothing(rays: &[Ray]) -> Faults {
     let no_shapes = instances(vec![], &[transform(DMat3::IDENTITY, DVec3::ZERO)]);
-    let of = |accel: &dyn Accelerator| {
-        let answers = all_answers(accel, rays).into_iter();
-        let hits: usize = answers
-            .map(|(hits, occluded)| hits.iter().flatten().count() + occluded.iter().filter(|o| **o).count())
-            .sum();
-        hits + usize::from(!accel.bounds().is_empty())
-    };
-    [Geometry::default(), no_shapes]
-        .iter()
-        .flat_map(|geometry| all(geometry).into_iter().map(|(_, accel)| of(&*accel)).collect::<Vec<_>>())
-        .sum()
+    let mut faults = Faults::NONE;
+    for geometry in &[Geometry::default(), no_shapes] {
+        for (name, accel) in all(geometry) {
+            faults += hits(name, &*accel, rays);
+            faults.require(accel.bounds().is_empty(), || format!("{name}: {:?}", accel.bounds()));
+        }
+    }
+    faults
 }
 
 fn single_shapes() -> Vec<Geometry> {
@@ -110,24 +108,32 @@ pub(super) fn e8_life_of_scenes(effort: Effort) -> Outcome {
 
 pub(super) fn e9_memory(effort: Effort) -> Outcome {
     let mut rng = Rng::new(91);
-    let mut geometries: Vec<Geometry> = scenes().into_iter().map(|(_, geometry)| geometry).collect();
-    geometries.push(moving_scene(&mut rng));
-    geometries.push(meshes(vec![bumpy_sphere(effort.pick(20_000, 1_000_000))]));
-    let (mut built, mut kept, mut unaccounted, mut failed, mut most) = (0, 0isize, 0, 0, 0);
-    for geometry in &geometries {
+    let mut geometries = scenes();
+    geometries.push(("moving", moving_scene(&mut rng)));
+    geometries.push(("bumpy sphere", meshes(vec![bumpy_sphere(effort.pick(20_000, 1_000_000))])));
+    let (mut built, mut most) = (0, 0);
+    let [mut kept, mut unaccounted, mut failed] = [const { Faults::NONE }; 3];
+    for (name, geometry) in &geometries {
         let rays = test_rays(&mut rng, geometry, 100);
         for quality in [EmbreeQuality::Low, EmbreeQuality::Medium, EmbreeQuality::High] {
             let options = EmbreeOptions { quality, ..EmbreeOptions::default() };
-            let Ok(accel) = EmbreeAccel::with_options(geometry, 2, options) else {
-                failed += 1;
-                continue;
+            let accel = match EmbreeAccel::with_options(geometry, 2, options) {
+                Ok(accel) => accel,
+                Err(error) => {
+                    failed.add(1, || format!("{name}, {quality:?}: {error}"));
+                    continue;
+                }
             };
             // A triangle's corners alone are 36 bytes.
             let triangles = geometry.world.iter().map(|id| geometry.shape(*id).prim_count()).sum::<usize>();
-            unaccounted += usize::from(accel.memory_bytes() < if triangles > 1_000 { 36 * triangles } else { 0 });
-            most = most.max(accel.memory_bytes());
+            let bytes = accel.memory_bytes();
+            unaccounted.require(triangles <= 1_000 || bytes >= 36 * triangles, || {
+                format!("{name}, {quality:?}: {bytes} bytes of {triangles} triangles")
+            });
+            most = most.max(bytes);
             all_answers(&accel, &rays);
-            kept += accel.release().abs();
+            let left = accel.release();
+            kept.add(left.unsigned_abs(), || format!("{name}, {quality:?}: {left} bytes"));
             built += 1;
         }
     }
@@ -136,5 +142,5 @@ pub(super) fn e9_memory(effort: Effort) -> Outcome {
         .none("that could not be built", failed)
         .record("most bytes held", most as f64)
         .none("large scenes that hold less than their corners", unaccounted)
-        .none("bytes held after the release", kept.unsigned_abs())
+        .none("bytes held after the release", kept)
 }

@@ -95,7 +95,7 @@ fn faults_of(
 }
 
 /// The answers of any entry point that are hits, of closest-hit and any-hit queries.
-fn hits(name: &str, accel: &dyn Accelerator, rays: &[Ray]) -> Faults {
+pub(super) fn hits(name: &str, accel: &dyn Accelerator, rays: &[Ray]) -> Faults {
     faults_of(name, accel, rays, |_, hit, occluded| usize::from(hit.is_some()) + usize::from(occluded))
 }
 

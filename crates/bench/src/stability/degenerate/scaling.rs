@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::{Effort, Outcome};
+use super::{Effort, Faults, Outcome};
 use crate::accel::AccelKind;
 use crate::film::Image;
 use crate::math::float::UNIT_ROUNDOFF;
@@ -90,6 +90,16 @@ fn difference(a: &Image, b: &Image) -> f64 {
     (squares / count).sqrt() / (sum / count)
 }
 
+/// The pixels of a picture that are not those of another.
+fn differing_pixels(found: &Image, expected: &Image, what: &str) -> Faults {
+    let mut differing = Faults::NONE;
+    for (i, (p, q)) in (0u32..).zip(pixels(found).zip(pixels(expected))) {
+        let [x, y] = [i % found.size[0], i / found.size[0]];
+        differing.require(p == q, || format!("{what}: pixel ({x}, {y}) is {p:?} in place of {q:?}"));
+    }
+    differing
+}
+
 /// Smallest p-value of Welch's test over the blocks of two sets of pictures.
 fn welch(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
     let moments = |runs: &[Vec<f64>], block: usize| {
@@ -111,7 +121,7 @@ fn welch(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
 pub(super) fn e7_scenes_of_every_size(effort: Effort) -> Outcome {
     let exponents: Vec<i32> = effort.pick(vec![-15, -9, -3, 15], (-16..=16).filter(|k| *k != 0).collect());
     let runs = effort.pick(5, 12);
-    let (mut smallest, mut largest, mut inexact) = (1f64, 0f64, 0);
+    let (mut smallest, mut largest, mut inexact) = (1f64, 0f64, Faults::NONE);
     let mut curves = Vec::new();
     let mut tests = 0;
     for name in ["embree", "bvh"] {
@@ -132,7 +142,7 @@ pub(super) fn e7_scenes_of_every_size(effort: Effort) -> Outcome {
             level.push((s, noise));
         }
         for s in [-50, -30, 30, 50].map(|k| 2f64.powi(k)) {
-            inexact += pixels(&picture(s, kind, 1)).zip(pixels(&same_seed)).filter(|(p, q)| p != q).count();
+            inexact += differing_pixels(&picture(s, kind, 1), &same_seed, &format!("{name}, scale {s:e}"));
         }
         curves.push((format!("{name}, the same random numbers"), curve));
         if curves.len() == 1 {
@@ -181,4 +191,20 @@ pub(super) fn e11_scenes_in_every_place(effort: Effort) -> Outcome {
             floor: 1e-9,
             curves,
         })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_changed_pixel_is_the_counterexample() {
+        let expected = Image::of_color([3, 2], vec![1.0; 24]);
+        let mut found = expected.clone();
+        assert_eq!(differing_pixels(&found, &expected, "bvh").count, 0);
+        found.layers[0].data[4 * 5 + 2] = 1f32.next_up();
+        let faults = differing_pixels(&found, &expected, "bvh");
+        let text = "bvh: pixel (2, 1) is [1.0, 1.0, 1.0000001] in place of [1.0, 1.0, 1.0]";
+        assert_eq!((faults.count, faults.first.as_deref()), (1, Some(text)));
+    }
 }

@@ -1,6 +1,9 @@
 //! Picture files.
 
+use std::path::Path;
+
 use half::f16;
+use image::RgbImage;
 
 use super::{Effort, Faults, Outcome, bytes, mean_by_film};
 use crate::color::linear_from_srgb;
@@ -23,16 +26,21 @@ fn picture(rng: &mut Rng) -> Image {
     Image { size: [40, 30], crop, layers: LayerInfo::ALL.iter().map(&mut layer).collect(), ..Image::default() }
 }
 
-/// How many of the pictures end in a PNG of other bytes than the first. (An EXR holds the render time.)
-pub(super) fn differing_files(images: &[Image]) -> usize {
-    let Ok(folder) = tempfile::tempdir() else { return images.len() };
+/// The pictures, each with its number of threads, that end in a PNG of other bytes than the first. (An EXR holds the
+/// render time.)
+pub(super) fn differing_files(images: &[(usize, Image)]) -> Faults {
+    let Ok(folder) = tempfile::tempdir() else { return images.len().into() };
     let written = |image: &Image| {
         let path = folder.path().join("a.png");
         write_png(&path, image, 0.0, ViewDesc::Srgb).ok()?;
         std::fs::read(&path).ok()
     };
-    let first = written(&images[0]);
-    images.iter().filter(|image| first.is_none() || written(image) != first).count()
+    let first = written(&images[0].1);
+    let mut faults = Faults::NONE;
+    for (threads, image) in images {
+        faults.require(first.is_some() && written(image) == first, || format!("{threads} threads"));
+    }
+    faults
 }
 
 /// How many numbers of a colour layer come back otherwise than as `expected`.
@@ -54,20 +62,27 @@ fn halved(x: f32) -> f32 {
 }
 
 /// Codes of a PNG of all codes that come back as others.
-fn changed_codes(folder: &std::path::Path) -> usize {
+fn changed_codes(folder: &Path) -> Faults {
     let path = folder.join("ramp.png");
     let ramp = |i: u32| linear_from_srgb((i % 256) as f32 / 255.0);
     let size = [256, 9];
     let data = (0..size[0] * size[1]).flat_map(|i| [ramp(i), ramp(i + 85), ramp(i + 170), 1.0]).collect();
     let image = Image::of_color(size, data);
-    let Some(read) = write_png(&path, &image, 0.0, ViewDesc::Srgb).ok().and_then(|()| image::open(&path).ok()) else {
-        return 256;
-    };
-    let code = |x: u32, shift: u32| ((x + shift) % 256) as u8;
-    read.into_rgb8()
-        .enumerate_pixels()
-        .filter(|(x, _, pixel)| pixel.0 != [code(*x, 0), code(*x, 85), code(*x, 170)])
-        .count()
+    let written = write_png(&path, &image, 0.0, ViewDesc::Srgb).map_err(|e| e.to_string());
+    match written.and_then(|()| image::open(&path).map_err(|e| e.to_string())) {
+        Ok(read) => differing_codes(&read.into_rgb8()),
+        Err(message) => Faults { count: 256, first: Some(message) },
+    }
+}
+
+/// Pixels that have not the codes of their column.
+fn differing_codes(read: &RgbImage) -> Faults {
+    let mut faults = Faults::NONE;
+    for (x, y, pixel) in read.enumerate_pixels() {
+        let expected = [0, 85, 170].map(|shift| ((x + shift) % 256) as u8);
+        faults.require(pixel.0 == expected, || format!("pixel ({x}, {y}) is {:?} in place of {expected:?}", pixel.0));
+    }
+    faults
 }
 
 /// The relative error of a film's mean of a million numbers from that of a compensated sum.
@@ -119,4 +134,20 @@ pub(super) fn m7_files(effort: Effort) -> Outcome {
         .none("pictures of halves that change when written again", again)
         .none("codes of a PNG that change", changed_codes(folder.path()))
         .at_most("relative error of the mean of a million samples", error_of_sums(&mut rng), 1e-7)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_changed_code_is_the_counterexample() {
+        let code = |x: u32| [0, 85, 170].map(|shift| ((x + shift) % 256) as u8);
+        let mut picture = RgbImage::from_fn(256, 9, |x, _| image::Rgb(code(x)));
+        assert_eq!(differing_codes(&picture).count, 0);
+        picture.get_pixel_mut(7, 3).0[1] += 1;
+        let faults = differing_codes(&picture);
+        let expected = "pixel (7, 3) is [7, 93, 177] in place of [7, 92, 177]";
+        assert_eq!((faults.count, faults.first.as_deref()), (1, Some(expected)));
+    }
 }

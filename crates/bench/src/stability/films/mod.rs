@@ -10,7 +10,7 @@ use files::m7_files;
 use filters::{m1_integrals, m2_sampled_filters};
 
 use super::geometry::Rng;
-use super::render::{Estimate, pixels, prepare, render, render_with};
+use super::render::{Estimate, not_finite, pixels, prepare, render, render_with};
 use super::{Effort, Faults, Outcome, sidak_level};
 use crate::accel::AccelKind;
 use crate::color::Rgb;
@@ -210,7 +210,7 @@ fn m4_same_bytes(effort: Effort) -> Outcome {
         orders.push(order);
     }
     let shuffled = Faults::of(&orders, |order| usize::from(pictures(order) != expected), |order| format!("{order:?}"));
-    let files = files::differing_files(&[of(1), of(2), of(8)]);
+    let files = files::differing_files(&[1, 2, 8].map(|threads| (threads, of(threads))));
     Outcome::new()
         .none("numbers of threads with other bits than one thread", differ)
         .none("orders of tiles with other bits", shuffled)
@@ -290,19 +290,22 @@ fn m6_spoilt_samples(effort: Effort) -> Outcome {
         }
     }
     let image = film.resolve();
-    let infinite = image.layers.iter().flat_map(|layer| &layer.data).filter(|v| !v.is_finite()).count();
     let found: Vec<_> = pixels(&image).enumerate().collect();
     let wrong = Faults::of(&found, |(_, p)| usize::from(*p != [0.25; 3]), |(i, p)| format!("pixel {i}: {p:?}"));
     let first = film.dropped().first().copied();
-    let replayable = first.is_some_and(|d| d.x < 8 && d.y < 8);
+    let mut misplaced = Faults::NONE;
+    misplaced.require(first.is_some_and(|d| d.x < 8 && d.y < 8), || format!("{first:?}"));
+    let mut miscounted = Faults::NONE;
+    let dropped = film.dropped_count();
+    miscounted.add(dropped.abs_diff(bad) as usize, || format!("{dropped} of {bad} are counted"));
     Outcome::new()
         .record("spoilt samples", bad as f64)
         .none("spoilt samples taken", taken)
         .none("good samples refused", refused)
-        .none("difference of the count of dropped samples", film.dropped_count().abs_diff(bad) as usize)
-        .none("numbers of the picture that are not finite", infinite)
+        .none("difference of the count of dropped samples", miscounted)
+        .none("numbers of the picture that are not finite", not_finite(&image))
         .none("pixels that are not the mean of their good samples", wrong)
-        .none("first dropped samples without a place to replay", usize::from(!replayable))
+        .none("first dropped samples without a place to replay", misplaced)
         .record("mean of samples -1 and 3, kept as they are", mean_by_film([-1.0, 3.0].into_iter()))
         .short(
             "negative samples are kept, where the catalogue requires them to be dropped: images of an environment may \

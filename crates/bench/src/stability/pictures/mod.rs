@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::render::{Prepared, merge, pixels, prepare, render_with};
 use super::verdict::Tests;
-use super::{Effort, Outcome};
+use super::{Effort, Faults, Outcome};
 use crate::accel::AccelKind;
 use crate::film::Image;
 use crate::render::Overrides;

@@ -1,6 +1,6 @@
 //! Scenes pay only for what they use.
 
-use super::{Effort, Outcome, Value, json, luminance, merge, scene};
+use super::{Effort, Faults, Outcome, Value, json, luminance, merge, scene};
 use crate::accel::{AccelKind, EmbreeAccel, Registered};
 use crate::render::Overrides;
 use crate::stability::render::{prepare, render_with};
@@ -42,7 +42,14 @@ fn rays(scene: &Value) -> [u64; 2] {
 
 pub(super) fn r7_pay_for_use(_: Effort) -> Outcome {
     let (nothing, unused) = registered(&plain());
-    let total = |r: Registered| r.filters + r.user_geometries + r.entered_instances + r.time_steps;
+    let mut registering = Faults::NONE;
+    registering.add(nothing.filters + nothing.user_geometries + nothing.entered_instances + nothing.time_steps, || {
+        format!("{nothing:?}")
+    });
+    let mut features = Faults::NONE;
+    for (is_used, feature) in unused.into_iter().zip(["motion", "analytic shapes", "textures", "media", "lens"]) {
+        features.require(!is_used, || feature.to_owned());
+    }
 
     // Each feature alone registers what it needs, and no other does.
     let path = json!([{ "time": 0 }, { "time": 1, "transform": [{ "translate": [1, 0, 0] }] }]);
@@ -58,7 +65,11 @@ pub(super) fn r7_pay_for_use(_: Effort) -> Outcome {
         (moving, Registered { entered_instances: 1, ..none }),
         (deforming, Registered { time_steps: 1, ..none }),
     ];
-    let other = cases.iter().filter(|(scene, expected)| registered(scene).0 != *expected).count();
+    let mut other = Faults::NONE;
+    for (scene, expected) in &cases {
+        let found = registered(scene).0;
+        other.require(found == *expected, || format!("{found:?} in place of {expected:?}: {scene}"));
+    }
 
     // By chance alone there are no shadow rays, nor towards an even sky; neither normals nor light that is seen
     // directly need a second ray.
@@ -74,11 +85,16 @@ pub(super) fn r7_pay_for_use(_: Effort) -> Outcome {
     let direct: u64 = with(json!({ "type": "path", "max_depth": 1 })).iter().sum();
     let by_lights = with(json!({ "type": "path", "strategy": "light" }))[1];
     let both = with(json!({ "type": "path" }));
+    let (mut shadow, mut further) = (Faults::NONE, Faults::NONE);
+    shadow.add(by_chance as usize, || "by chance alone".into());
+    shadow.add(both[1] as usize, || "towards an even sky".into());
+    further.add(normals as usize, || "for normals".into());
+    further.add(direct as usize, || "at depth 1".into());
     Outcome::new()
-        .none("filters, callbacks and time steps of triangles at rest", total(nothing))
-        .none("features of such a scene that it does not have", unused.iter().filter(|used| **used).count())
+        .none("filters, callbacks and time steps of triangles at rest", registering)
+        .none("features of such a scene that it does not have", features)
         .none("features that register other than they need", other)
-        .none("shadow rays by chance alone, and towards an even sky", (by_chance + both[1]) as usize)
-        .none("rays beside the camera's for normals and at depth 1", (normals + direct) as usize)
+        .none("shadow rays by chance alone, and towards an even sky", shadow)
+        .none("rays beside the camera's for normals and at depth 1", further)
         .at_least("rays where they are needed", both[0].min(by_lights) as f64, 1.0)
 }

@@ -1,8 +1,10 @@
 //! Boxes: closed ones that must not leak, and instances of them.
 
-use super::{Effort, Leavings, NAMES, Outcome, accelerators};
-use crate::accel::{self, AccelKind};
-use crate::geometry::{Analytic, Geometry, Instance, Mesh, MeshStep, Object, Shape, Sphere, TransformedShape};
+use super::{Effort, Faults, Leavings, NAMES, Outcome, accelerators};
+use crate::accel::{self, AccelKind, Accelerator};
+use crate::geometry::{
+    Analytic, Geometry, Instance, Mesh, MeshStep, Object, Shape, Sphere, SurfaceInteraction, TransformedShape,
+};
 use crate::id::{ObjectId, ShapeId};
 use crate::math::{DAffine3, DMat3, DVec3, Motion, Ray, Transform};
 use crate::stability::geometry::{Rng, closest, cube, instances, meshes, ray, ray_through, transform, world};
@@ -11,28 +13,32 @@ pub(super) fn b4_closed_boxes(effort: Effort) -> Outcome {
     let mut rng = Rng::new(4);
     let mut outcome = Outcome::new();
     for (half, offset) in [(1e-6, 0.0), (1.0, 0.0), (1e6, 0.0), (1e-6, 1e-2), (1.0, 1e4), (1e6, 1e10), (1000.0, 1e7)] {
-        let mut counts = [[0usize; 3]; NAMES.len()];
+        let mut tallies = <[(usize, Faults, Faults); NAMES.len()]>::default();
         for _ in 0..4 {
             let center = DVec3::new(0.8, -0.5, 0.3) * offset;
             let geometry = meshes(vec![cube(rng.rotation() * half, center)]);
-            for ((_, accel), [rays, own, leaks]) in accelerators(&geometry).iter().zip(&mut counts) {
+            for ((_, accel), (rays, own, leaks)) in accelerators(&geometry).iter().zip(&mut tallies) {
                 for _ in 0..effort.pick(3_000, 30_000) {
                     let Some(si) = closest(&**accel, &geometry, &ray(center, rng.direction())).found else { continue };
                     let direction = rng.direction_around(-si.n_g.as_dvec3());
-                    let next = closest(&**accel, &geometry, &si.spawn(direction.as_vec3())).found;
+                    let leaving = si.spawn(direction.as_vec3());
+                    let next = closest(&**accel, &geometry, &leaving).found;
                     *rays += 1;
-                    *leaks += usize::from(next.is_none());
-                    *own += usize::from(next.is_some_and(|hit| hit.prim == si.prim));
+                    leaks.require(next.is_some(), || format!("{leaving:?} from {si:?}"));
+                    own.require(next.as_ref().is_none_or(|hit| hit.prim != si.prim), || {
+                        format!("{leaving:?} from {si:?} meets {next:?}")
+                    });
                 }
             }
         }
         let allowed = if offset == 0.0 { 0.0 } else { 5e-4 };
-        for (name, [rays, own, leaks]) in NAMES.iter().zip(counts) {
+        for (name, (rays, own, leaks)) in NAMES.iter().zip(tallies) {
             let what = format!("half size {half:e} at {offset:e}, {name}");
             outcome = outcome
                 .at_least(format!("{what}: rays"), rays as f64, 0.999 * 4.0 * effort.pick(3_000.0, 30_000.0))
                 .none(format!("{what}: own triangle"), own)
-                .at_most(format!("{what}: fraction leaked"), leaks as f64 / rays as f64, allowed);
+                .at_most(format!("{what}: fraction leaked"), leaks.count as f64 / rays as f64, allowed)
+                .shown_by(&leaks);
         }
     }
     outcome
@@ -156,38 +162,61 @@ fn chains(rng: &mut Rng, time: f64) -> Vec<Chain> {
     all
 }
 
+/// What rays along the normal from both sides of points have met.
+#[derive(Default)]
+struct Sides {
+    points: usize,
+    both: Faults,
+    only_front: Faults,
+    neither: Faults,
+}
+
+impl Sides {
+    fn add(&mut self, accel: &dyn Accelerator, geometry: &Geometry, si: &SurfaceInteraction) {
+        let front = si.spawn(si.n_g);
+        let back = Ray { direction: si.n_g, ..si.spawn(-si.n_g) };
+        let [of_front, of_back] = [front, back].map(|ray| closest(accel, geometry, &ray).found);
+        let describe = || format!("{front:?} and {back:?} from {si:?} meet {of_front:?} and {of_back:?}");
+        self.points += 1;
+        match (of_front.is_some(), of_back.is_some()) {
+            (true, true) => self.both.add(1, describe),
+            (true, false) => self.only_front.add(1, describe),
+            (false, false) => self.neither.add(1, describe),
+            (false, true) => {}
+        }
+    }
+
+    fn report(&self, outcome: Outcome, name: &str) -> Outcome {
+        let all = self.points as f64;
+        let only_back = self.points - self.both.count - self.only_front.count - self.neither.count;
+        outcome
+            .at_least(format!("{name}: points"), all, 1_000.0)
+            .none(format!("{name}: both hit"), self.both.clone())
+            .none(format!("{name}: only the front one hits"), self.only_front.clone())
+            .at_most(format!("{name}: fraction where neither hits"), self.neither.count as f64 / all, 0.01)
+            .shown_by(&self.neither)
+            .at_least(format!("{name}: fraction where only the back one hits"), only_back as f64 / all, 0.99)
+    }
+}
+
 pub(super) fn b3_two_sides(effort: Effort) -> Outcome {
     const TIME: f32 = 0.66;
     let mut rng = Rng::new(3);
-    // Front and back: hits and misses.
-    let mut counts = [[[0usize; 2]; 2]; 2];
+    let mut sides = <[Sides; 2]>::default();
     for _ in 0..effort.pick(4, 40) {
         for Chain { geometry, at_time } in chains(&mut rng, f64::from(TIME)) {
-            for ((kind, _), counts) in [AccelKind::ALL[0], AccelKind::ALL[1]].into_iter().zip(&mut counts) {
+            for ((kind, _), sides) in [AccelKind::ALL[0], AccelKind::ALL[1]].into_iter().zip(&mut sides) {
                 let accel = accel::build(kind, &geometry, 1).expect("accelerators build");
                 for _ in 0..effort.pick(100, 2_000) {
                     let target = at_time.transform_point3(0.5 * rng.cube());
                     let primary = Ray { time: TIME, ..ray_through(target + 20.0 * rng.direction(), target) };
                     let Some(si) = closest(&*accel, &geometry, &primary).found else { continue };
-                    let front = si.spawn(si.n_g);
-                    let back = Ray { direction: si.n_g, ..si.spawn(-si.n_g) };
-                    let hits = [front, back].map(|ray| usize::from(closest(&*accel, &geometry, &ray).found.is_some()));
-                    counts[hits[0]][hits[1]] += 1;
+                    sides.add(&*accel, &geometry, &si);
                 }
             }
         }
     }
-    let mut outcome = Outcome::new();
-    for (name, [[neither, back], [front, both]]) in ["embree", "bvh"].iter().zip(counts) {
-        let all = (neither + back + front + both) as f64;
-        outcome = outcome
-            .at_least(format!("{name}: points"), all, 1_000.0)
-            .none(format!("{name}: both hit"), both)
-            .none(format!("{name}: only the front one hits"), front)
-            .at_most(format!("{name}: fraction where neither hits"), neither as f64 / all, 0.01)
-            .at_least(format!("{name}: fraction where only the back one hits"), back as f64 / all, 0.99);
-    }
-    outcome
+    ["embree", "bvh"].iter().zip(&sides).fold(Outcome::new(), |outcome, (name, sides)| sides.report(outcome, name))
 }
 
 /// The chains that move or deform, for rays that leave outwards.
@@ -197,4 +226,32 @@ pub(super) fn moving_chains(rng: &mut Rng, time: f64) -> Vec<(Geometry, DAffine3
         .filter(|chain| chain.geometry.is_moving())
         .map(|chain| (chain.geometry, chain.at_time))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn build(geometry: &Geometry) -> Box<dyn Accelerator + '_> {
+        accel::build(AccelKind::EMBREE, geometry, 1).expect("Embree builds cubes")
+    }
+
+    /// Rays from a cube, traced through other scenes than it.
+    #[test]
+    fn rays_that_meet_too_little_or_too_much_are_counterexamples() {
+        let of_cubes =
+            |sizes: &[f64]| meshes(sizes.iter().map(|&size| cube(DMat3::IDENTITY * size, DVec3::ZERO)).collect());
+        let geometry = of_cubes(&[1.0]);
+        let ray = ray(DVec3::new(0.1, 0.2, -5.0), DVec3::Z);
+        let si = closest(&*build(&geometry), &geometry, &ray).found.expect("the ray is aimed at the cube");
+        let sides = |sizes: &[f64]| {
+            let (other, mut sides) = (of_cubes(sizes), Sides::default());
+            sides.add(&*build(&other), &other, &si);
+            sides
+        };
+        let right = sides(&[1.0]);
+        assert_eq!((right.both.count, right.only_front.count, right.neither.count), (0, 0, 0));
+        assert!(sides(&[0.5]).neither.first.is_some_and(|text| text.ends_with("meet None and None")));
+        assert!(sides(&[1.0, 2.0]).both.first.is_some_and(|text| text.contains("meet Some")));
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Effort, NAMES, Named, Outcome, accelerators, aimed, point_on, seen};
+use super::{Effort, Faults, NAMES, Named, Outcome, accelerators, aimed, point_on, seen};
 use crate::color::Rgb;
 use crate::geometry::{
     Analytic, Disk, Frustum, Geometry, Mesh, Profile, Quad, Revolution, Shape, Sphere, TransformedShape,
@@ -76,12 +76,15 @@ impl Room {
     }
 }
 
-/// Samples each light of `emitter` from the floor; counts shadow rays and those that are occluded, by accelerator.
-fn shadow_rays(rng: &mut Rng, emitter: &Shape, distance: f64, count: usize, counts: &mut [[usize; 2]; NAMES.len()]) {
+/// By accelerator: how many shadow rays there were, and those that are occluded.
+type Tallies = [(usize, Faults); NAMES.len()];
+
+/// Samples each light of `emitter` from the floor.
+fn shadow_rays(rng: &mut Rng, emitter: &Shape, distance: f64, count: usize, tallies: &mut Tallies) {
     let room = Room::new(rng, emitter, distance);
     let lights = AreaLight::for_shape(ShapeId(1), Emission::constant(Rgb::WHITE), &room.geometry, &[]);
     let accels: Vec<Named> = accelerators(&room.geometry);
-    for ((_, accel), [rays, occluded]) in accels.iter().zip(counts) {
+    for ((_, accel), (rays, occluded)) in accels.iter().zip(tallies) {
         for _ in 0..count {
             let target = point_on(rng, &room.floor, PrimId(0));
             let Some(si) = seen(&**accel, &room.geometry, &aimed(rng, target, room.n, (0.4 * distance).min(1.0)))
@@ -98,13 +101,14 @@ fn shadow_rays(rng: &mut Rng, emitter: &Shape, distance: f64, count: usize, coun
                 continue;
             }
             *rays += 1;
-            *occluded += usize::from(accel.occluded(&sample.shadow_ray(&si)));
+            let ray = sample.shadow_ray(&si);
+            occluded.require(!accel.occluded(&ray), || format!("{ray:?} from {si:?} to {sample:?}"));
         }
     }
 }
 
-fn report(outcome: Outcome, what: &str, counts: [[usize; 2]; NAMES.len()]) -> Outcome {
-    NAMES.iter().zip(counts).fold(outcome, |outcome, (name, [rays, occluded])| {
+fn report(outcome: Outcome, what: &str, tallies: Tallies) -> Outcome {
+    NAMES.iter().zip(tallies).fold(outcome, |outcome, (name, (rays, occluded))| {
         outcome
             .at_least(format!("{what}, {name}: shadow rays"), rays as f64, 500.0)
             .none(format!("{what}, {name}: occluded"), occluded)
@@ -114,25 +118,25 @@ fn report(outcome: Outcome, what: &str, counts: [[usize; 2]; NAMES.len()]) -> Ou
 pub(super) fn b12_emitters(effort: Effort) -> Outcome {
     let mut rng = Rng::new(12);
     emitters().iter().fold(Outcome::new(), |outcome, (name, emitter)| {
-        let mut counts = [[0; 2]; NAMES.len()];
+        let mut tallies = Tallies::default();
         for _ in 0..effort.pick(60, 600) {
             let distance = rng.magnitude(-3.0, 6.0);
-            shadow_rays(&mut rng, emitter, distance, effort.pick(60, 300), &mut counts);
+            shadow_rays(&mut rng, emitter, distance, effort.pick(60, 300), &mut tallies);
         }
-        report(outcome, name, counts)
+        report(outcome, name, tallies)
     })
 }
 
 pub(super) fn b15_sliver_emitters(effort: Effort) -> Outcome {
     let mut rng = Rng::new(15);
     [1e-2, 1e-4].iter().fold(Outcome::new(), |outcome, &aspect| {
-        let mut counts = [[0; 2]; NAMES.len()];
+        let mut tallies = Tallies::default();
         for _ in 0..effort.pick(100, 1_000) {
             let tip = DVec3::new(rng.range(0.2, 0.8), aspect, 0.0);
             let emitter = Shape::Mesh(triangle(DVec3::ZERO, DVec3::X, tip));
             let distance = rng.magnitude(-3.0, 3.0);
-            shadow_rays(&mut rng, &emitter, distance, effort.pick(60, 300), &mut counts);
+            shadow_rays(&mut rng, &emitter, distance, effort.pick(60, 300), &mut tallies);
         }
-        report(outcome, &format!("aspect {aspect}"), counts)
+        report(outcome, &format!("aspect {aspect}"), tallies)
     })
 }

@@ -1,6 +1,6 @@
 //! Triangles, alone and among their neighbours.
 
-use super::{Effort, Leavings, NAMES, Outcome, accelerators, aimed, either, leaving, point_on, seen};
+use super::{Effort, Faults, Leavings, NAMES, Outcome, accelerators, aimed, either, leaving, point_on, seen};
 use crate::accel::{Accelerator, LinearAccel};
 use crate::geometry::{Mesh, Shape};
 use crate::id::PrimId;
@@ -78,7 +78,7 @@ pub(super) fn b5_slivers(effort: Effort) -> Outcome {
 
 pub(super) fn b6_neighbours(effort: Effort) -> Outcome {
     let mut rng = Rng::new(6);
-    let (mut rays, mut falsely, mut occluded) = (0, 0, 0);
+    let (mut rays, mut falsely, mut occluded) = (0, Faults::NONE, Faults::NONE);
     for _ in 0..effort.pick(40, 400) {
         let aspect = rng.magnitude(-2.0, 0.0);
         let frame = rng.rotation() * rng.magnitude(-3.0, 3.0);
@@ -94,7 +94,7 @@ pub(super) fn b6_neighbours(effort: Effort) -> Outcome {
         for _ in 0..effort.pick(250, 3_000) {
             let prim = PrimId::new(rng.below(plane.triangles().len()));
             let target = point_on(&mut rng, &plane, prim);
-            for (_, accel) in &accels {
+            for (name, accel) in &accels {
                 let Some(si) = seen(&**accel, &geometry, &aimed(&mut rng, target, n, x.length())) else { continue };
                 let side = either(&mut rng, si.n_g);
                 let ray = si.spawn(leaving(&mut rng, side).as_vec3());
@@ -103,16 +103,19 @@ pub(super) fn b6_neighbours(effort: Effort) -> Outcome {
                     continue;
                 }
                 rays += 1;
-                falsely += usize::from(closest(&**accel, &geometry, &ray).found.is_some());
-                occluded += usize::from(accel.occluded(&ray));
+                let found = closest(&**accel, &geometry, &ray).found;
+                falsely.require(found.is_none(), || format!("{name}: {ray:?} from {si:?} meets {found:?}"));
+                occluded.require(!accel.occluded(&ray), || format!("{name}: {ray:?} from {si:?}"));
             }
         }
     }
     let rays = f64::from(rays);
     Outcome::new()
         .at_least("rays", rays, 1_000.0)
-        .at_most("fraction with a false hit", falsely as f64 / rays, 1e-5)
-        .at_most("fraction called occluded", occluded as f64 / rays, 1e-5)
+        .at_most("fraction with a false hit", falsely.count as f64 / rays, 1e-5)
+        .shown_by(&falsely)
+        .at_most("fraction called occluded", occluded.count as f64 / rays, 1e-5)
+        .shown_by(&occluded)
 }
 
 pub(super) fn b8_large_ground(effort: Effort) -> Outcome {
