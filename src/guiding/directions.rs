@@ -2,8 +2,8 @@
 //! octahedron maps to the sphere.
 //!
 //! The cells are listed along a Z-order curve, with where each ends on the curve and how much of the light comes before
-//! that. Both lists are search trees of 32 keys of 16 bits a node, side by side, so that the cell of a direction, or that
-//! of a random number, is found in two steps at most without branches, in a few cache lines.
+//! that. Both lists are search trees of 32 keys of 16 bits a node, side by side, so that the cell of a direction, or
+//! that of a random number, is found in two steps at most without branches, in a few cache lines.
 
 use std::sync::Arc;
 

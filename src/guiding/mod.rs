@@ -15,7 +15,7 @@ mod tests;
 
 pub use directions::{DirectionDistribution, GuideSample, PdfLookup, SampleLookup};
 pub use quadtree::DirectionRecords;
-pub use space::Place;
+pub use space::TreePoint;
 
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 
@@ -186,13 +186,13 @@ impl Guide {
 
     /// Where a surface is in the trees over space.
     #[inline(always)]
-    pub fn place(&self, p: Vec3, n: Vec3) -> Place {
-        Place::new(root(n), self.normalized(p))
+    pub fn place(&self, p: Vec3, n: Vec3) -> TreePoint {
+        TreePoint::new(root(n), self.normalized(p))
     }
 
     /// The number of the [region](Self::region) around a surface; it is being loaded then.
     #[inline]
-    pub fn find_region(&self, place: Place) -> u32 {
+    pub fn find_region(&self, place: TreePoint) -> u32 {
         let region = self.trees.find(place);
         prefetch(&self.learned, region);
         region as u32
@@ -215,7 +215,7 @@ impl Guide {
     #[inline]
     pub fn find_leaf(&self, record: &Record) -> RecordLeaf {
         let (at, root) = (self.normalized(record.p), root(record.n));
-        let leaf = self.trees.find(Place::new(root, at));
+        let leaf = self.trees.find(TreePoint::new(root, at));
         prefetch(&self.leaves, leaf);
         RecordLeaf { at, root, leaf }
     }
@@ -257,7 +257,7 @@ impl Guide {
         let jitter = |k: u32| size((depth + 2 - k) / 3) * (unit(first >> (20 * k)) - 0.5);
         let moved = at + Vec3::new(jitter(0), jitter(1), jitter(2));
         let is_inside = moved.min_element() >= 0.0 && moved.max_element() < 1.0;
-        let leaf = if is_inside { self.trees.find(Place::new(root, moved)) } else { leaf };
+        let leaf = if is_inside { self.trees.find(TreePoint::new(root, moved)) } else { leaf };
         self.leaves[leaf].records.add(direction, [unit(second), unit(second >> 32)], amount as u64);
     }
 

@@ -34,14 +34,14 @@ impl Node {
 
 /// A point in one of the trees.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Place {
+pub struct TreePoint {
     /// The tree.
     pub root: u32,
     /// The divisions that lead to the point, the first in the highest of [`MAX_DEPTH`] bits.
     pub path: u64,
 }
 
-impl Place {
+impl TreePoint {
     /// Of a point of the unit cube.
     #[inline(always)]
     pub fn new(root: u32, at: Vec3) -> Self {
@@ -102,7 +102,7 @@ impl SpaceTrees {
 
     /// The leaf around a point.
     #[inline(always)]
-    pub fn find(&self, place: Place) -> usize {
+    pub fn find(&self, place: TreePoint) -> usize {
         let mut left = MAX_DEPTH - ROOT_DIVISIONS;
         let mut entry = self.tables[(place.root as usize) << ROOT_DIVISIONS | (place.path >> left) as usize];
         loop {
@@ -199,7 +199,7 @@ mod tests {
                 let scale = 0.5f32.powi(rng.below(17) as i32);
                 let at = Vec3::new(rng.unit_f32(), rng.unit_f32(), rng.unit_f32()) * scale;
                 let (leaf, depth) = walk(&nodes, root, at);
-                assert_eq!(trees.find(Place::new(root as u32, at)), leaf);
+                assert_eq!(trees.find(TreePoint::new(root as u32, at)), leaf);
                 assert_eq!(trees.depth(leaf), depth);
                 deepest = deepest.max(depth);
             }

@@ -32,13 +32,12 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
     if let Some(regions) = regions {
         guided::mix_scatter_pdfs(regions, vertices);
     }
-    let Vertices { rows, points, light_samples, light_evals: evals, direct, .. } = &mut *vertices;
-    let lights = (&*light_samples, &*evals);
+    let Vertices { rows, points, light_samples: lights, light_evals: evals, direct, .. } = &mut *vertices;
     let is_mis = context.config.strategy == Strategy::Mis;
     if context.scene.features.normal_perturbations {
-        vectorize!(illuminate::<true>(rows, points, lights, direct, is_mis, count));
+        vectorize!(illuminate::<true>(rows, points, lights, evals, direct, is_mis, count));
     } else {
-        vectorize!(illuminate::<false>(rows, points, lights, direct, is_mis, count));
+        vectorize!(illuminate::<false>(rows, points, lights, evals, direct, is_mis, count));
     }
     if context.scene.features.shading_normals {
         wave.counts.shadow += offset_below_facets(context, vertices, terminator_rays);
@@ -80,7 +79,8 @@ fn choose_lights(context: &Context, vertices: &mut Vertices, queue: &mut LightQu
 fn illuminate<const PERTURBED: bool>(
     rows: &VertexRows,
     points: &PointRows,
-    (lights, evals): (&LightSampleRows, &EvalRows),
+    lights: &LightSampleRows,
+    evals: &EvalRows,
     direct: &mut DirectRows,
     is_mis: bool,
     count: usize,

@@ -7,7 +7,7 @@ use super::evals::Surfaces;
 use super::radiance::Output;
 use super::wave::{BsdfScratch, PathRows};
 use crate::color::Rgb;
-use crate::guiding::{Guide, GuideRegion, PdfLookup, Place, Record, RecordLeaf};
+use crate::guiding::{Guide, GuideRegion, PdfLookup, Record, RecordLeaf, TreePoint};
 use crate::light::light_target;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::rows::{BATCH, Row, Vec3Rows};
@@ -85,7 +85,7 @@ pub(super) type Regions<'a> = [Option<GuideRegion<'a>>; BATCH];
 /// Finds the regions of a block's vertices. Here and below, loops begin lookups in one pass and finish them in the
 /// next: all lanes wait for memory together.
 pub(super) fn find_regions<'a>(guide: &'a Guide, vertices: &Vertices) -> Regions<'a> {
-    let mut places = [Place::default(); BATCH];
+    let mut places = [TreePoint::default(); BATCH];
     vectorize!(find_places(guide, vertices, &mut places));
     let mut numbers = [0; BATCH];
     let lanes = || (0..vertices.count.min(BATCH)).filter(|&lane| is_guided(vertices, lane));
@@ -103,7 +103,7 @@ pub(super) fn find_regions<'a>(guide: &'a Guide, vertices: &Vertices) -> Regions
 }
 
 #[inline(always)]
-fn find_places(guide: &Guide, vertices: &Vertices, places: &mut [Place; BATCH]) {
+fn find_places(guide: &Guide, vertices: &Vertices, places: &mut [TreePoint; BATCH]) {
     for (lane, place) in places.iter_mut().enumerate().take(vertices.count) {
         *place = guide.place(vertices.points.p.get(lane).as_vec3(), vertices.facing_normal(lane));
     }
