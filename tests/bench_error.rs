@@ -142,6 +142,8 @@ fn other_renderers_run_by_their_python_modules() {
     assert_eq!(names, ["steradian", "cycles"]);
     let run = &report["variants"][1]["points"][0]["runs"][0];
     assert_eq!((&run["seconds"], &run["processor_seconds"], &run["relmse"]), (&json!(0.5), &json!(0.75), &json!(0.0)));
+    let run = bench(&[&[scene.as_str(), "--peers"], &arguments[..]].concat());
+    assert!(String::from_utf8_lossy(&run.stderr).contains("has no renderer that reads"), "{run:?}");
     for (peer, message) in [
         (luxcore.as_str(), "has no module pyluxcore"),
         ("cycles", "is not a scene that it reads (.blend, .gltf, .glb)"),

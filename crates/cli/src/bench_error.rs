@@ -18,7 +18,8 @@ use steradian_bench::report::Report;
 use crate::args::{BenchErrorArgs, Verbosity};
 use crate::bench::{Steps, command_line, spinner};
 use crate::interrupt::Interrupt;
-use crate::{scene, text};
+use crate::log::Level;
+use crate::{log, scene, text};
 
 /// Runs the benchmark; the result is the exit code.
 pub fn run(arguments: &BenchErrorArgs) -> Result<u8> {
@@ -114,8 +115,10 @@ fn peers(
             peers.push((peer, &arguments.scene));
         }
     }
-    if peers.is_empty() {
-        return Ok(Vec::new());
+    if arguments.all_peers && peers.is_empty() {
+        let python = arguments.python.display();
+        let message = format!("--peers: {python} has no renderer that reads {}", arguments.scene.display());
+        log::message(Level::Warning, &message);
     }
     let size = match reference {
         Standard::File(_, image) => [image.crop.width, image.crop.height],

@@ -182,8 +182,7 @@ impl Curves {
         if self.kind != CurveKind::Round || self.basis == CurveBasis::Linear || is_joined {
             return false;
         }
-        let mut segments = (0..self.prim_count()).map(|i| self.segment(PrimId::new(i)));
-        let others = segments.by_ref().filter(|segment| !segment.is_slender()).count();
+        let others = (0..self.prim_count()).filter(|&i| !self.segment(PrimId::new(i)).is_slender()).count();
         others * MOST_OTHERS <= self.prim_count() && self.points.iter().all(is_sized)
     }
 

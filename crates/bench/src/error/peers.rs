@@ -63,9 +63,9 @@ impl Peer {
 
     fn script(self) -> &'static str {
         match self {
-            Self::Mitsuba => include_str!("peers/mitsuba.py"),
-            Self::Cycles => include_str!("peers/cycles.py"),
-            Self::LuxCore => include_str!("peers/luxcore.py"),
+            Self::Mitsuba => concat!(include_str!("peers/common.py"), include_str!("peers/mitsuba.py")),
+            Self::Cycles => concat!(include_str!("peers/common.py"), include_str!("peers/cycles.py")),
+            Self::LuxCore => concat!(include_str!("peers/common.py"), include_str!("peers/luxcore.py")),
         }
     }
 

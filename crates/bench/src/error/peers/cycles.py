@@ -2,34 +2,10 @@
 
 Every pixel has the same number of samples; nothing is denoised."""
 
-import argparse
-import json
-import os
-import resource
 import sys
-import time
 
 import bpy
 
-
-def processor_seconds():
-    usage = resource.getrusage(resource.RUSAGE_SELF)
-    return usage.ru_utime + usage.ru_stime
-
-
-parser = argparse.ArgumentParser()
-parser.add_argument("scene")
-parser.add_argument("--spp", type=int)
-parser.add_argument("--seed", type=int)
-parser.add_argument("--threads", type=int)
-parser.add_argument("--size", type=int, nargs=2)
-parser.add_argument("--define", action="append", default=[], help="not used")
-parser.add_argument("--out")
-arguments = parser.parse_args()
-
-# Blender writes messages to standard output, which is for the figures.
-figures = os.dup(1)
-os.dup2(2, 1)
 if arguments.scene.endswith(".blend"):
     bpy.ops.wm.open_mainfile(filepath=arguments.scene, use_scripts=False)
 else:
@@ -62,17 +38,17 @@ if arguments.threads:
 def spent(samples):
     """Seconds and processor seconds of a render, with what comes before its first sample."""
     scene.cycles.samples = samples
-    start, before = time.monotonic(), processor_seconds()
+    start = now()
     bpy.ops.render.render(write_still=True)
-    return [time.monotonic() - start, processor_seconds() - before]
+    return [b - a for a, b in zip(start, now())]
 
 
 # A first render loads what Cycles needs. The second and the third differ by samples alone, which takes out what comes
 # before.
 spent(1)
 first = spent(1)
-all_samples = spent(arguments.spp)
+whole = spent(arguments.spp)
 if arguments.spp > 1:
     scale = arguments.spp / (arguments.spp - 1)
-    all_samples = [max((full - one) * scale, 0) or full for full, one in zip(all_samples, first)]
-os.write(figures, json.dumps(dict(zip(("render_seconds", "processor_seconds"), all_samples))).encode() + b"\n")
+    whole = [max((b - a) * scale, 0) or b for a, b in zip(first, whole)]
+report(whole)

@@ -2,25 +2,7 @@
 
 The engine is PATHCPU, unless the file names another of the CPU."""
 
-import argparse
-import json
-import os
-import time
-
-parser = argparse.ArgumentParser()
-parser.add_argument("scene")
-parser.add_argument("--spp", type=int)
-parser.add_argument("--seed", type=int)
-parser.add_argument("--threads", type=int)
-parser.add_argument("--size", type=int, nargs=2)
-parser.add_argument("--define", action="append", default=[], help="not used")
-parser.add_argument("--out")
-arguments = parser.parse_args()
-
-# LuxCore writes messages to standard output, which is for the figures.
-figures = os.dup(1)
-os.dup2(2, 1)
-import pyluxcore  # noqa: E402
+import pyluxcore
 
 pyluxcore.Init(lambda message: None)
 out = os.path.abspath(arguments.out)
@@ -48,15 +30,15 @@ if arguments.size:
 session = pyluxcore.RenderSession(pyluxcore.RenderConfig(properties))
 # Starting builds the accelerator.
 session.Start()
-start, before = time.monotonic(), time.process_time()
+start = now()
 while not session.HasDone():
     time.sleep(0.01)
     session.UpdateStats()
-spent = {"render_seconds": time.monotonic() - start, "processor_seconds": time.process_time() - before}
+end = now()
 session.UpdateStats()
 samples = session.GetStats().Get("stats.renderengine.pass").GetInt()
 session.Stop()
 session.GetFilm().SaveOutput(out, pyluxcore.FilmOutputType.RGB, pyluxcore.Properties())
-os.write(figures, json.dumps({**spent, "spp": samples or arguments.spp}).encode() + b"\n")
+report([b - a for a, b in zip(start, end)], spp=samples or arguments.spp)
 # Its destructors crash when Python ends.
 os._exit(0)

@@ -1,12 +1,7 @@
 """Renders a scene of Mitsuba 3 (XML) with the variant llvm_ad_rgb, its own integrator and sampler."""
 
-import argparse
 import glob
-import json
-import os
 import re
-import resource
-import time
 
 
 def find_llvm():
@@ -21,21 +16,6 @@ def find_llvm():
     if found:
         os.environ["DRJIT_LIBLLVM_PATH"] = found[max(found)]
 
-
-def processor_seconds():
-    usage = resource.getrusage(resource.RUSAGE_SELF)
-    return usage.ru_utime + usage.ru_stime
-
-
-parser = argparse.ArgumentParser()
-parser.add_argument("scene")
-parser.add_argument("--spp", type=int)
-parser.add_argument("--seed", type=int)
-parser.add_argument("--threads", type=int)
-parser.add_argument("--size", type=int, nargs=2)
-parser.add_argument("--define", action="append", default=[])
-parser.add_argument("--out")
-arguments = parser.parse_args()
 
 find_llvm()
 import mitsuba as mi  # noqa: E402
@@ -53,10 +33,10 @@ if arguments.size:
 # The first render compiles the kernels.
 dr.eval(mi.render(scene, spp=1, seed=2**31))
 dr.sync_thread()
-start, before = time.monotonic(), processor_seconds()
+start = now()
 image = mi.render(scene, spp=arguments.spp, seed=arguments.seed)
 dr.eval(image)
 dr.sync_thread()
-spent = {"render_seconds": time.monotonic() - start, "processor_seconds": processor_seconds() - before}
+end = now()
 mi.Bitmap(image).write(arguments.out)
-print(json.dumps(spent))
+report([b - a for a, b in zip(start, end)])
