@@ -2,14 +2,12 @@
 
 use serde_json::{Value, json};
 use steradian::ErrorKind;
-use steradian::internal::accel::AccelKind;
 use steradian::internal::assets::{VolumeData, vol_bytes};
-use steradian::internal::render::Overrides;
 
 use crate::bad_input::assert_error;
 use crate::participating_media::{self, assert_means, foggy, hg, integral, runs};
 use crate::util::folder::{Folder, good_scene, set};
-use crate::util::render::{Estimate, assert_blocks_agree, block_means, merge, prepare, probe, render, render_with};
+use crate::util::render::{Estimate, assert_blocks_agree, merge, probe, render};
 
 /// A ball of a medium whose box is around it.
 fn ball(medium: &Value) -> Value {

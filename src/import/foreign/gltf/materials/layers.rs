@@ -4,11 +4,11 @@
 use super::super::extensions as ext;
 use super::super::textures::TextureRef;
 use super::Builder;
-use crate::desc::{
-    AbsorptionDesc, ChannelDesc, CoefficientDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, MediumDesc,
-    PhaseDesc, PrincipledDesc, RangedDesc, RoughnessDesc, ScalarDesc, SubsurfaceMethodDesc,
-};
 use crate::color::Rgb;
+use crate::desc::{
+    AbsorptionDesc, ChannelDesc, CoefficientDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc,
+    MediumDesc, PhaseDesc, PrincipledDesc, RangedDesc, RoughnessDesc, ScalarDesc, SubsurfaceMethodDesc,
+};
 use crate::error::Result;
 use crate::medium::Subsurface;
 
@@ -46,7 +46,7 @@ impl Builder<'_, '_> {
         }
         desc.ior = Some(RangedDesc::Constant(kept));
         let Some(specular) = self.extension::<ext::Specular>(SPECULAR)? else { return Ok(()) };
-        if self.has_transmission() {
+        if self.has(TRANSMISSION) {
             self.ignored(SPECULAR, "glass reflects by its index of refraction");
             return Ok(());
         }
@@ -126,19 +126,39 @@ impl Builder<'_, '_> {
 
     /// What changes its colour with the angle does not here.
     pub(super) fn iridescence(&mut self) {
-        let mut names = vec!["KHR_materials_iridescence", "KHR_materials_subsurface"];
-        if desc.subsurface_radius.is_none() {
-            names.push(DIFFUSE_TRANSMISSION);
-        }
-        for name in names {
-            if self.extensions().is_some_and(|all| all.contains_key(name)) {
+        for name in ["KHR_materials_iridescence", "KHR_materials_subsurface"] {
+            if self.has(name) {
                 self.ignored(name, "not read");
             }
         }
     }
 
-    fn has_transmission(&self) -> bool {
-        self.extensions().is_some_and(|all| all.contains_key(TRANSMISSION))
+    fn has(&self, extension: &str) -> bool {
+        self.extensions().is_some_and(|all| all.contains_key(extension))
+    }
+
+    /// What is dense below a surface that transmits diffusely, as a random walk.
+    pub(super) fn walk_below(&mut self, desc: &mut PrincipledDesc) -> Result<()> {
+        let Some(below) = self.extension::<ext::DiffuseTransmission>(DIFFUSE_TRANSMISSION)? else { return Ok(()) };
+        let share = self.inputs.share(below.diffuse_transmission_factor);
+        let volume = self.extension::<ext::Volume>(VOLUME)?.as_ref().and_then(absorption);
+        let scatter = self.extension::<ext::VolumeScatter>(VOLUME_SCATTER)?;
+        let (Some(volume), Some(scatter), false) = (volume, scatter, self.has(TRANSMISSION)) else {
+            self.ignored(DIFFUSE_TRANSMISSION, "read only beside a volume that scatters");
+            return Ok(());
+        };
+        let [absorption, scattering] = coefficients(&volume, &scatter);
+        let g = scatter.anisotropy();
+        desc.base_color = ColorDesc::Rgb(scatter.multiscatter_color.map(|c| self.inputs.share(c)));
+        desc.subsurface = ScalarDesc::Constant(share);
+        desc.subsurface_method = SubsurfaceMethodDesc::RandomWalk;
+        let reduced = [0, 1, 2].map(|i| absorption[i] + (1.0 - g) * scattering[i]);
+        desc.subsurface_radius = Some(CoefficientDesc::Rgb(reduced.map(|c| c.recip().clamp(1e-12, 1e12))));
+        desc.subsurface_anisotropy = (g != 0.0).then_some(g);
+        for name in [VOLUME, VOLUME_SCATTER, DIFFUSE_TRANSMISSION] {
+            self.approximated(name, "a random walk below a surface of the colour of multiple scattering");
+        }
+        Ok(())
     }
 
     /// Glass: thin without a thickness, a medium if it absorbs or disperses and is glass all over.
@@ -148,9 +168,7 @@ impl Builder<'_, '_> {
         let abbe =
             self.extension::<ext::Dispersion>(DISPERSION)?.map(|d| d.dispersion).filter(|d| *d > 0.0).map(|d| 20.0 / d);
         let Some(transmission) = self.extension::<ext::Transmission>(TRANSMISSION)? else {
-            if let (Some(volume), Some(scatter)) = (&volume, &scatter)
-                && self.walk_below(&mut desc, volume, scatter)?
-            {
+            if desc.subsurface_radius.is_some() {
                 return Ok(MaterialDesc::Principled(Box::new(desc)));
             }
             let given = [(VOLUME, volume.is_some()), (VOLUME_SCATTER, scatter.is_some()), (DISPERSION, abbe.is_some())];
@@ -184,30 +202,6 @@ impl Builder<'_, '_> {
             return Ok(MaterialDesc::Principled(Box::new(desc)));
         }
         Ok(self.solid_glass(desc, volume.as_ref(), scatter.as_ref(), abbe))
-    }
-
-    /// What is dense below a surface that transmits diffusely, as a random walk; whether there is such.
-    fn walk_below(
-        &mut self,
-        desc: &mut PrincipledDesc,
-        volume: &ext::Volume,
-        scatter: &ext::VolumeScatter,
-    ) -> Result<bool> {
-        let below = self.extension::<ext::DiffuseTransmission>(DIFFUSE_TRANSMISSION)?;
-        let share = below.map_or(0.0, |below| self.inputs.share(below.diffuse_transmission_factor));
-        let Some(absorption) = absorption(volume).filter(|_| share > 0.0) else { return Ok(false) };
-        let [absorption, scattering] = coefficients(&absorption, scatter);
-        let g = scatter.anisotropy();
-        desc.base_color = ColorDesc::Rgb(scatter.multiscatter_color.map(|c| self.inputs.share(c)));
-        desc.subsurface = ScalarDesc::Constant(share);
-        desc.subsurface_method = SubsurfaceMethodDesc::RandomWalk;
-        let reduced = [0, 1, 2].map(|i| absorption[i] + (1.0 - g) * scattering[i]);
-        desc.subsurface_radius = Some(CoefficientDesc::Rgb(reduced.map(|c| c.recip().clamp(1e-12, 1e12))));
-        desc.subsurface_anisotropy = (g != 0.0).then_some(g);
-        for name in [VOLUME, VOLUME_SCATTER, DIFFUSE_TRANSMISSION] {
-            self.approximated(name, "a random walk below a surface of the colour of multiple scattering");
-        }
-        Ok(true)
     }
 
     /// Glass that is not thin: a dielectric if it absorbs or disperses and is glass all over.
@@ -303,7 +297,7 @@ impl Builder<'_, '_> {
             ChannelDesc::G,
             coat.clearcoat_roughness_factor,
         )?;
-        let is_opaque = !self.has_transmission()
+        let is_opaque = !self.has(TRANSMISSION)
             || matches!(&base, MaterialDesc::Principled(p) if matches!(p.transmission, ScalarDesc::Constant(0.0)));
         if !is_opaque {
             return Ok(self.coated_glass(base, amount, &roughness));
