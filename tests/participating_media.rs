@@ -392,9 +392,16 @@ fn light_scattered_once_by_fog_is_in_its_layer() {
     for (pixel, part) in color.pixels().zip(volume.pixels()) {
         assert!(pixel[0] > 0.0 && pixel[..3] == part[..3]);
     }
-    // The camera sees a point of the fog in front of it.
+    // The camera sees a point of the fog in front of it, whose whole way is within 1e3.
     let depth = image.layer(LayerKind::Z).unwrap();
-    assert!(depth.data.iter().all(|&z| z > 0.0));
+    assert!(depth.data.iter().all(|&z| z > 0.0 && z < 1e3));
+    let coverage = image.coverage.as_ref().unwrap();
+    let prepared = prepare(&scene, &Overrides::default());
+    for pixel in 0..coverage.pixels() {
+        let [(key, 1.0)] = coverage.of(pixel) else { panic!("{:?}", coverage.of(pixel)) };
+        let identities = &prepared.scene.identities;
+        assert_eq!([identities.object(*key), identities.material(*key).into(), identities.asset(*key)], ["fog"; 3]);
+    }
     let alpha: Vec<f32> = color.pixels().map(|p| p[3]).collect();
     assert!(alpha.iter().all(|&a| a == 1.0));
 }
