@@ -4,7 +4,7 @@
     benches/layer_cost.py [--scene SCENE]... [--spp N] [--rounds N] [--binary FILE] [--only LAYERS]
 
 Rendering with a layer and without it take turns, and the ratio of each pair is taken; the table has the medians. Time is that of the render loop, in
-processor seconds of all threads (both from the program's `--json`); files are EXR, ZIP, with their default types. The last line has all layers.
+processor seconds of all threads (both from the program's `--stats`); files are EXR, ZIP, with their default types. The last line has all layers.
 """
 
 import argparse
@@ -31,7 +31,7 @@ def layers_of(binary):
 def render(binary, scene, spp, layers, folder):
     """Processor seconds of rendering, and bytes of the file."""
     out, stats = folder / "a.exr", folder / "a.json"
-    command = [binary, "render", scene, "--spp", str(spp), "-q", "-o", out, "--json", stats]
+    command = [binary, "render", scene, "--spp", str(spp), "-q", "-o", out, "--stats", stats]
     if layers:
         command += ["--layers", ",".join(layers)]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)

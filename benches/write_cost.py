@@ -49,7 +49,7 @@ def main():
         shards = {name: folder / f"{name}.shard" for name in outputs}
         for pixels, options in [("half", []), ("float", ["--float"])]:
             def render(binary, name, file, *more):
-                compression = [] if name == "png" else ["--compression", name]
+                compression = [] if name == "png" else ["--exr", f"compression={name}"]
                 command = [binary, "render", arguments.scene, "--size", arguments.size, "--spp", arguments.spp, "--layers", "all"]
                 return run([*command, *options, *compression, *more, "-q", "-o", file])
 

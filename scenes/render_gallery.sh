@@ -62,7 +62,7 @@ while read -r picture scene size samples options; do
         *) samples=(--spp $((samples * ${PERCENT:-100} / 100))) ;;
     esac
     # shellcheck disable=SC2086 # The options are words.
-    "$program" render "$scene.json" -q --size "$size" "${samples[@]}" $options --json "$stats" -o "pictures/$picture.png"
+    "$program" render "$scene.json" -q --size "$size" "${samples[@]}" $options --stats "$stats" -o "pictures/$picture.png"
     spp=$(number spp)
     seconds=$(LC_ALL=C printf '%.0f' "$(number render_seconds)")
     sed -i "/(pictures\/$picture.png)/s/[0-9]* spp, [0-9]* s/$spp spp, $seconds s/" README.md

@@ -75,8 +75,8 @@ pub use integrator::RayCounts;
 pub use output::Matte;
 pub use render::{ExrOverrides, Overrides, Progress, Settings, Shard, Stats, TrainedGuide};
 pub use renderer::{
-    Assignment, LayerView, PreparedRender, Renderer, Rendering, StateOptions, StopHandle, Watch, changed_settings,
-    default_outputs, layers_of,
+    Assignment, ExrChanges, LayerView, PreparedRender, Renderer, Rendering, StateOptions, StopHandle, Watch,
+    changed_settings, default_outputs, layers_of,
 };
 pub use sampling::SamplerKind;
 

@@ -42,7 +42,7 @@ fn reports_compare_variants_and_programs_in_one_run() {
     let reference = reference(&folder, &scene);
     let out = folder.path("report");
     let command =
-        format!("self='{PROGRAM}' render {{scene}} --spp {{spp}} --seed {{seed}} --float -q -o {{out}} --json -");
+        format!("self='{PROGRAM}' render {{scene}} --spp {{spp}} --seed {{seed}} --float -q -o {{out}} --stats -");
     let arguments = [
         "--reference",
         &reference,

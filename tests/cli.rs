@@ -19,7 +19,7 @@ fn faults_have_their_exit_codes_and_one_line() {
         ("render broken.json", 3),
         ("render missing.json", 4),
         ("render scene.json -o missing/a.exr", 5),
-        ("render scene.json --json missing/a.json", 5),
+        ("render scene.json --stats missing/a.json", 5),
         ("render scene.json --size 65536x65536", 33),
         ("compare a.exr b.exr", 4),
         ("--help", 0),
@@ -35,10 +35,31 @@ fn faults_have_their_exit_codes_and_one_line() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
 }
 
+/// A scene that does not exist is named even if an option's value is wrong, too.
+#[test]
+fn a_missing_scene_and_a_wrong_value_are_both_reported() {
+    let folder = tempfile::tempdir().unwrap();
+    for (arguments, missing) in [
+        ("render missing.json --layers Q", true),
+        ("render --spp many missing.json", true),
+        ("info missing.json --time x", true),
+        ("render scene.json --layers Q", false),
+        ("render shot.####.json --frames 1-2 --layers Q", false),
+    ] {
+        let output = run(folder.path(), arguments);
+        let text = stderr_of(&output);
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {text}");
+        assert_eq!(text.starts_with("error: missing.json: no such file\n"), missing, "{arguments}: {text}");
+        assert!(text.contains("error: invalid value"), "{arguments}: {text}");
+    }
+    let old = stderr_of(&run(folder.path(), "render scene.json --owner me"));
+    assert!(old.contains("In place of --owner: --exr owner=TEXT"), "{old}");
+}
+
 #[test]
 fn without_outputs_the_files_are_named_after_the_scene() {
     let folder = tempfile::tempdir().unwrap();
-    let output = run(folder.path(), "render scene.json --layers Z --json stats.json --accel embree");
+    let output = run(folder.path(), "render scene.json --layers Z --stats stats.json --accel embree");
     assert_eq!(output.status.code(), Some(0), "{}", stderr_of(&output));
     let stderr = stderr_of(&output);
     assert!(
@@ -77,7 +98,7 @@ fn without_outputs_the_files_are_named_after_the_scene() {
 #[test]
 fn quiet_runs_say_nothing_and_statistics_go_to_stdout() {
     let folder = tempfile::tempdir().unwrap();
-    let output = run(folder.path(), "render scene.json -q -o a.exr --json -");
+    let output = run(folder.path(), "render scene.json -q -o a.exr --stats -");
     assert_eq!((output.status.code(), stderr_of(&output).as_str()), (Some(0), ""));
     let stats: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(stats["outputs"], serde_json::json!(["a.exr"]));
@@ -149,7 +170,7 @@ fn signals_and_time_limits_end_a_pass_that_does_not_end() {
     assert_eq!(output.status.code(), Some(2), "{message}");
     assert!(message.contains("--time-limit 0.1: "), "{message}");
 
-    for options in ["", "--guiding on", "--target-error 0.1"] {
+    for options in ["", "--guiding", "--target-error 0.1"] {
         let mut child = limited(options);
         // The program listens as soon as the accelerator is built.
         let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
@@ -217,7 +238,7 @@ fn the_short_help_shows_the_common_options() {
     assert!(!short.contains(&"--log-file".to_owned()) && long.contains(&"--log-file".to_owned()));
 
     let help = String::from_utf8(run(folder.path(), "render --help").stdout).unwrap();
-    for value in ["- mis:", "- N:", "- agx:", "- whitted:", "- zips:"] {
+    for value in ["- mis:", "- N:", "- agx:", "- whitted:", "zips           Deflate line by line"] {
         assert!(help.contains(value), "{value} has no description: {help}");
     }
     let help = String::from_utf8(run(folder.path(), "bench scale --help").stdout).unwrap();

@@ -366,7 +366,7 @@ fn the_program_denoises_renders_and_files() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
     std::fs::write(root.join("room.json"), room(4, &[]).to_string()).unwrap();
-    let done = run(root, "render room.json --denoise --crop 8,8,48,40 -o a.exr -o a.png --json stats.json");
+    let done = run(root, "render room.json --denoise --crop 8,8,48,40 -o a.exr -o a.png --stats stats.json");
     assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
     let stats: Value = serde_json::from_str(&std::fs::read_to_string(root.join("stats.json")).unwrap()).unwrap();
     assert!(

@@ -85,11 +85,11 @@ fn values(path: &Path, name: &str) -> Vec<f32> {
 /// Renders the scene as `PROFILE.exr` for each profile.
 fn render_profiles(dir: &Path) {
     for profile in PROFILES {
-        let extra = if profile == "multipart" { " --compression dwaa --crypto-manifest sidecar" } else { "" };
+        let extra = if profile == "multipart" { " --exr compression=dwaa,crypto_manifest=sidecar" } else { "" };
         run_ok(
             dir,
             &format!(
-                "render scene.json -q -o {profile}.exr --spp 4 --layers {ALL_LAYERS} --exr-profile {profile}{extra}"
+                "render scene.json -q -o {profile}.exr --spp 4 --layers {ALL_LAYERS} --exr profile={profile}{extra}"
             ),
         );
     }
@@ -102,7 +102,7 @@ fn every_profile_is_clean() {
     let dir = folder.path();
     render_profiles(dir);
     for profile in PROFILES {
-        let report = run_ok(dir, &format!("check-exr {profile}.exr --profile {profile} --strict"));
+        let report = run_ok(dir, &format!("check-exr {profile}.exr --profile {profile} --fail-on-warning"));
         assert!(report.contains("clean"), "{report}");
     }
     for profile in ["nuke", "blender"] {
@@ -183,9 +183,9 @@ fn windows_are_those_of_crops_and_overscan() {
         (data.position.0, data.position.1, data.size.0, data.size.1, original)
     };
     assert_eq!(window("--crop 5,6,20,10"), (5, 6, 20, 10, None));
-    assert_eq!(window("--crop 5,6,20,10 --uncropped"), (0, 0, 40, 30, Some((5, 20))));
+    assert_eq!(window("--crop 5,6,20,10 --exr uncropped=true"), (0, 0, 40, 30, Some((5, 20))));
     assert_eq!(window("--overscan 4"), (-4, -4, 48, 38, None));
-    assert_eq!(window("--overscan 4 --uncropped"), (0, 0, 40, 30, Some((-4, 48))));
+    assert_eq!(window("--overscan 4 --exr uncropped=true"), (0, 0, 40, 30, Some((-4, 48))));
 }
 
 /// The picture of a file is rendered again bit for bit, and what has changed is named.
@@ -194,8 +194,8 @@ fn a_file_is_rendered_again() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     let options =
-        "--spp 5 --seed 7 --crop 3,4,30,20 --max-depth 3 --layers Z,albedo,crypto_object --float --crypto-depth 4";
-    run_ok(dir, &format!("render scene.json -q -o a.exr -o a.png --json stats.json --threads 2 {options}"));
+        "--spp 5 --seed 7 --crop 3,4,30,20 --max-depth 3 --layers Z,albedo,crypto_object --float --exr crypto_depth=4";
+    run_ok(dir, &format!("render scene.json -q -o a.exr -o a.png --stats stats.json --threads 2 {options}"));
     let quiet = run(dir, "rerender a.exr -o b.exr -q --threads 1");
     assert!(quiet.status.success() && quiet.stderr.is_empty() && quiet.stdout.is_empty(), "{}", text(&quiet.stderr));
     assert_eq!(channels(&dir.join("a.exr")), channels(&dir.join("b.exr")));
@@ -250,15 +250,15 @@ fn checks_have_their_exit_codes() {
         ("check-exr a.exr --profile nuke", 0),
         ("check-exr warning.exr", 0),
         ("check-exr error.exr a.exr", 1),
-        ("check-exr warning.exr a.exr --strict", 1),
+        ("check-exr warning.exr a.exr --fail-on-warning", 1),
         ("check-exr broken.exr", 3),
         ("check-exr missing.exr", 4),
         ("check-exr", 2),
         ("rerender broken.exr -o new.exr", 3),
         ("rerender a.exr", 2),
-        ("render scene.json -o b.exr --layers N --compression dwaa", 2),
-        ("render scene.json -o b.exr --layers crypto_object --crypto-depth 5", 2),
-        ("render scene.json -o b.png --uncropped", 2),
+        ("render scene.json -o b.exr --layers N --exr compression=dwaa", 2),
+        ("render scene.json -o b.exr --layers crypto_object --exr crypto_depth=5", 2),
+        ("render scene.json -o b.png --exr uncropped=true", 2),
     ] {
         let output = run(dir, arguments);
         assert_eq!(output.status.code(), Some(code), "{arguments}: {}{}", text(&output.stdout), text(&output.stderr));
@@ -272,7 +272,7 @@ fn checks_have_their_exit_codes() {
     let json: Value = serde_json::from_str(&run_ok(dir, "check-exr warning.exr --json")).unwrap();
     assert_eq!(json[0]["findings"][0]["rule"], "color-id");
     assert_eq!(json[0]["findings"][0]["severity"], "warning");
-    let refused = text(&run(dir, "render scene.json -o b.exr --layers N --compression dwaa").stderr);
+    let refused = text(&run(dir, "render scene.json -o b.exr --layers N --exr compression=dwaa").stderr);
     assert!(refused.contains("layer N") && refused.contains("multipart"), "{refused}");
     // A picture of others without our attribute is no recipe.
     let plain = output::write_exr(

@@ -94,28 +94,31 @@ fn renders_overwrite_nothing_that_they_read() {
     for (arguments, uses) in [
         ("render studio.json", ["studio.exr (lights[0].file)", "studio.exr (output)"]),
         ("render studio.json -o hard.exr", ["studio.exr (lights[0].file)", "hard.exr (output)"]),
-        ("render studio.json -o a.exr --json m.obj", ["m.obj (shapes[0].file)", "m.obj (--json)"]),
-        ("render studio.json -o a.exr --json m.mtl", ["m.mtl (named by shapes[0].file)", "m.mtl (--json)"]),
+        ("render studio.json -o a.exr --stats m.obj", ["m.obj (shapes[0].file)", "m.obj (--stats)"]),
+        ("render studio.json -o a.exr --stats m.mtl", ["m.mtl (named by shapes[0].file)", "m.mtl (--stats)"]),
         ("render studio.json -o a.exr --report m.obj", ["m.obj (shapes[0].file)", "m.obj (--report)"]),
         ("render scene.json -o a.exr --report scene.json", ["scene.json (the scene)", "scene.json (--report)"]),
-        ("render scene.json -o a.exr --json link.json", ["scene.json (the scene)", "link.json (--json)"]),
-        ("render link.json -o a.exr --json sub/../scene.json", ["link.json (the scene)", "sub/../scene.json (--json)"]),
+        ("render scene.json -o a.exr --stats link.json", ["scene.json (the scene)", "link.json (--stats)"]),
+        (
+            "render link.json -o a.exr --stats sub/../scene.json",
+            ["link.json (the scene)", "sub/../scene.json (--stats)"],
+        ),
         ("render scene.json -o a.exr --log-file scene.json", ["scene.json (the scene)", "scene.json (--log-file)"]),
         (
             "render scene.json -o a.exr --checkpoint scene.json --resume",
             ["scene.json (the scene)", "scene.json (--checkpoint)"],
         ),
         ("render s.xml -o sky.exr", ["sky.exr", "(output)"]),
-        ("render s.xml -o a.exr --json part.xml", ["part.xml (a file of the scene)", "(--json)"]),
+        ("render s.xml -o a.exr --stats part.xml", ["part.xml (a file of the scene)", "(--stats)"]),
         ("render s.pbrt -o sky.exr", ["sky.exr", "(output)"]),
-        ("render s.pbrt -o a.exr --json part.pbrt", ["part.pbrt (a file of the scene)", "(--json)"]),
+        ("render s.pbrt -o a.exr --stats part.pbrt", ["part.pbrt (a file of the scene)", "(--stats)"]),
         ("info scene.json --report scene.json", ["(the scene)", "(--report)"]),
         ("info studio.json --report studio.exr", ["studio.exr (lights[0].file)", "(--report)"]),
     ] {
         assert_refused(dir, arguments, uses);
     }
     // What is written is at its place all the same.
-    let output = run(dir, "render studio.json -q -o sub/studio.exr --json sub/m.obj");
+    let output = run(dir, "render studio.json -q -o sub/studio.exr --stats sub/m.obj");
     assert!(output.status.success(), "{}", stderr_of(&output));
 }
 
@@ -126,22 +129,23 @@ fn no_two_things_are_written_to_one_file() {
     for (arguments, uses) in [
         ("render scene.json -o o.exr -o o.exr", ["o.exr (--output)", "o.exr (--output)"]),
         ("render scene.json -o o.exr -o ./o.exr", ["o.exr (--output)", "./o.exr (--output)"]),
-        ("render scene.json -o o.exr --json o.exr", ["(--output)", "(--json)"]),
+        ("render scene.json -o o.exr --stats o.exr", ["(--output)", "(--stats)"]),
         ("render scene.json -o o.exr --report o.exr", ["(--output)", "(--report)"]),
         ("render scene.json -o o.exr --log-file sub/../o.exr", ["o.exr (--output)", "(--log-file)"]),
-        ("render scene.json -o o.exr --json s.json --report ./s.json", ["(--json)", "(--report)"]),
+        ("render scene.json -o o.exr --stats s.json --report ./s.json", ["(--stats)", "(--report)"]),
         ("render scene.json -o c.exr --checkpoint c.exr", ["(--output)", "(--checkpoint)"]),
         ("render scene.json --shard 1/2 -o c.shard --checkpoint ./c.shard", ["(--output)", "(--checkpoint)"]),
-        ("render scene.json --json scene.png", ["scene.png (output)", "scene.png (--json)"]),
+        ("render scene.json --stats scene.png", ["scene.png (output)", "scene.png (--stats)"]),
         (
-            "render scene.json -o o.exr --layers crypto_object --crypto-manifest sidecar --json o.CryptoObject.json",
-            ["o.CryptoObject.json (output)", "(--json)"],
+            "render scene.json -o o.exr --layers crypto_object --exr crypto_manifest=sidecar \
+             --stats o.CryptoObject.json",
+            ["o.CryptoObject.json (output)", "(--stats)"],
         ),
     ] {
         assert_refused(dir, arguments, uses);
     }
     // One standard output or device may take several.
-    assert!(run(dir, "render scene.json -q -o n.exr --json - --report - --log-file /dev/null").status.success());
+    assert!(run(dir, "render scene.json -q -o n.exr --stats - --report - --log-file /dev/null").status.success());
 }
 
 #[test]
@@ -164,14 +168,14 @@ fn sequences_are_checked_before_their_first_frame() {
             ["s.0001.exr (output)", "s.0001.exr (output)"],
         ),
         (
-            "render each.#.json --frames 1-3 -o a.####.exr --json each.3.json",
-            ["each.3.json (the scene)", "each.3.json (--json)"],
+            "render each.#.json --frames 1-3 -o a.####.exr --stats each.3.json",
+            ["each.3.json (the scene)", "each.3.json (--stats)"],
         ),
         ("render scene.json --frames 1-3 -o s.####.exr --overwrite --checkpoint s.exr", ["(output)", "(--checkpoint)"]),
     ] {
         assert_refused(dir, arguments, uses);
     }
-    let output = run(dir, "render scene.json -q --frames 1-2 --spp 1 -o a.####.exr --json one.json");
+    let output = run(dir, "render scene.json -q --frames 1-2 --spp 1 -o a.####.exr --stats one.json");
     assert!(output.status.success(), "{}", stderr_of(&output));
 }
 

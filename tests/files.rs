@@ -33,33 +33,33 @@ fn statistics_go_to_devices_pipes_and_open_files() {
     for (json, after) in
         [("/dev/stdout", "| cat"), ("/dev/stdout", ""), ("/dev/fd/3", "3>&1"), ("/proc/self/fd/3", "3>&1 | cat")]
     {
-        let output = shell(folder.path(), &format!("\"$0\" render scene.json -q -o a.exr --json {json} {after}"));
+        let output = shell(folder.path(), &format!("\"$0\" render scene.json -q -o a.exr --stats {json} {after}"));
         assert!(is_statistics(&output.stdout), "{json} {after}: {}", stderr_of(&output));
     }
-    let output = shell(folder.path(), "\"$0\" render scene.json -q -o a.exr --json /dev/stderr");
+    let output = shell(folder.path(), "\"$0\" render scene.json -q -o a.exr --stats /dev/stderr");
     assert!(is_statistics(&output.stderr), "{}", stderr_of(&output));
     // What is redirected to a file comes between what else goes there.
     let output = shell(
         folder.path(),
-        "{ echo before; \"$0\" render scene.json -q -o a.exr --json /dev/stdout; echo after; } >out.txt",
+        "{ echo before; \"$0\" render scene.json -q -o a.exr --stats /dev/stdout; echo after; } >out.txt",
     );
     assert!(output.status.success(), "{}", stderr_of(&output));
     let text = std::fs::read_to_string(folder.path().join("out.txt")).unwrap();
     assert!(text.starts_with("before\n{") && text.ends_with("}\nafter\n"), "{text}");
     let output = shell(
         folder.path(),
-        "mkfifo p.exr p.json; cat p.exr >b.exr & cat p.json >b.json & \"$0\" render scene.json -q -o p.exr --json \
+        "mkfifo p.exr p.json; cat p.exr >b.exr & cat p.json >b.json & \"$0\" render scene.json -q -o p.exr --stats \
          p.json && wait",
     );
     assert!(output.status.success(), "{}", stderr_of(&output));
     assert!(is_statistics(&std::fs::read(folder.path().join("b.json")).unwrap()));
     assert_eq!(steradian::internal::output::read_exr(&folder.path().join("b.exr")).unwrap().size, [24, 16]);
-    for device in ["--json /dev/null", "--log-file /dev/null", "--report /dev/null"] {
+    for device in ["--stats /dev/null", "--log-file /dev/null", "--report /dev/null"] {
         let output = run(folder.path(), &format!("render scene.json -q -o a.exr {device}"));
         assert_eq!(output.status.code(), Some(0), "{}", stderr_of(&output));
     }
     assert!(std::fs::symlink_metadata("/dev/null").unwrap().file_type().is_char_device());
-    let output = run(folder.path(), "render scene.json -q -o a.exr --json /dev/full");
+    let output = run(folder.path(), "render scene.json -q -o a.exr --stats /dev/full");
     assert_eq!(output.status.code(), Some(5), "{}", stderr_of(&output));
     assert!(hidden(folder.path()).is_empty());
 }
@@ -115,7 +115,7 @@ fn what_never_ends_is_not_read() {
 fn killed_writers_leave_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();
     let arguments = "render scene.json -q --size 256x192 --spp 8000 --layers Z,N,P --checkpoint a.state --every 0 \
-                     --resume -o a.exr --json a.json";
+                     --resume -o a.exr --stats a.json";
     let left = || hidden(folder.path()).into_iter().filter(|name| name != ".a.state.lock").collect::<Vec<_>>();
     let mut killed = 0;
     for i in 0..8 {

@@ -97,7 +97,7 @@ fn frames_that_are_skipped_are_compared_with_this_render() {
     // The same again is no mixture, whatever frame comes first.
     let same = render("--frames 2-4");
     assert!(same.contains("2 frames exist") && !same.contains("warning"), "{same}");
-    let other = render("--frames 1-5 --spp 8 --compression piz");
+    let other = render("--frames 1-5 --spp 8 --exr compression=piz");
     let warning = other.lines().find(|line| line.contains("warning")).unwrap_or_default().to_owned();
     for part in ["frames 1-4: ", "spp: 4 in the file, 8 for the rest", "output.compression", "--overwrite"] {
         assert!(warning.contains(part), "{part}: {other}");

@@ -107,7 +107,7 @@ fn options_come_from_the_strongest_place() {
     let user = folder.path().join("config/steradian/config.toml");
     std::fs::create_dir_all(user.parent().unwrap()).unwrap();
     let spp = |arguments: &str, variable: Option<(&str, &str)>| -> u64 {
-        let mut command = steradian(folder.path(), &format!("render scene.json -q -o a.exr --json - {arguments}"));
+        let mut command = steradian(folder.path(), &format!("render scene.json -q -o a.exr --stats - {arguments}"));
         let output = command.envs(variable).output().unwrap();
         serde_json::from_slice::<Value>(&output.stdout).unwrap()["spp"].as_u64().unwrap()
     };
@@ -132,8 +132,47 @@ fn options_come_from_the_strongest_place() {
     // The project's file lies beside the scene, not above it.
     std::fs::create_dir(folder.path().join("shot")).unwrap();
     std::fs::write(folder.path().join("shot/scene.json"), SCENE).unwrap();
-    let output = run(folder.path(), "render shot/scene.json -q -o a.exr --json -");
+    let output = run(folder.path(), "render shot/scene.json -q -o a.exr --stats -");
     assert_eq!(serde_json::from_slice::<Value>(&output.stdout).unwrap()["spp"], 3);
+}
+
+/// Keys of EXR outputs come from several places, each key from the strongest; switches of files can be switched off.
+#[test]
+fn keys_of_exr_files_and_switches_come_from_the_strongest_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let file = "float = true\n[exr]\nowner = \"file\"\ncomments = \"of the file, all of it\"\ncompression = \"piz\"\n";
+    std::fs::write(dir.join("steradian.toml"), file).unwrap();
+    let mut command = steradian(dir, "render scene.json -q -o a.exr --exr compression=rle --no-float");
+    assert!(command.env("STERADIAN_EXR", "owner=environment").status().unwrap().success());
+    let meta = exr::meta::MetaData::read_from_file(dir.join("a.exr"), false).unwrap();
+    let header = &meta.headers[0];
+    let text = |text: &Option<exr::meta::attribute::Text>| text.as_ref().unwrap().to_string();
+    assert_eq!(text(&header.own_attributes.owner), "environment");
+    assert!(text(&header.own_attributes.comments).starts_with("of the file, all of it"));
+    assert_eq!(header.compression, exr::compression::Compression::RLE);
+    let red = header.channels.list.iter().find(|channel| channel.name == *"R").unwrap();
+    assert_eq!(red.sample_type, exr::meta::attribute::SampleType::F16);
+    let show = run(dir, "config show --json scene.json");
+    let shown: Value = serde_json::from_slice(&show.stdout).unwrap();
+    assert_eq!((&shown["exr.owner"]["value"], &shown["exr.compression"]["value"]), (&"file".into(), &"piz".into()));
+
+    // A switch that is off in a file is off, whatever the scene has.
+    std::fs::write(dir.join("steradian.toml"), "float = false\n").unwrap();
+    std::fs::write(
+        dir.join("float.json"),
+        SCENE.replacen('{', "{ \"outputs\": { \"file\": \"b.exr\", \"pixel_type\": \"float\" },", 1),
+    )
+    .unwrap();
+    let type_of = |options: &str| {
+        assert!(run(dir, &format!("render float.json -q {options}")).status.success());
+        let meta = exr::meta::MetaData::read_from_file(dir.join("b.exr"), false).unwrap();
+        meta.headers[0].channels.list.iter().find(|channel| channel.name == *"R").unwrap().sample_type
+    };
+    assert_eq!(type_of(""), exr::meta::attribute::SampleType::F16);
+    assert_eq!(type_of("--float"), exr::meta::attribute::SampleType::F32);
+    std::fs::remove_file(dir.join("steradian.toml")).unwrap();
+    assert_eq!(type_of(""), exr::meta::attribute::SampleType::F32);
 }
 
 #[test]
@@ -160,7 +199,7 @@ fn farms_say_how_many_processors_a_task_has() {
         ("SLURM_CPUS_PER_TASK", "--threads 2", 2),
         ("STERADIAN_THREADS", "", 3),
     ] {
-        let mut command = steradian(folder.path(), &format!("render scene.json -o a.exr --json - -v {arguments}"));
+        let mut command = steradian(folder.path(), &format!("render scene.json -o a.exr --stats - -v {arguments}"));
         let output = command.env(variable, "3").output().unwrap();
         assert_eq!(serde_json::from_slice::<Value>(&output.stdout).unwrap()["threads"], threads, "{variable}");
         assert_eq!(

@@ -82,7 +82,7 @@ fn long_names_are_marked_in_files_or_refused() {
     for (letters, is_long) in [(3, false), (30, true), (240, true)] {
         std::fs::write(at("s.json"), grouped(letters)).unwrap();
         for (profile, is_long) in [("nuke", is_long), ("multipart", is_long), ("blender", is_long)] {
-            let output = run(folder.path(), &format!("render s.json -q --exr-profile {profile}"));
+            let output = run(folder.path(), &format!("render s.json -q --exr profile={profile}"));
             assert_eq!(output.status.code(), Some(0), "{}", stderr_of(&output));
             let bytes = std::fs::read(at("a.exr")).unwrap();
             assert_eq!(bytes[5] & 4 != 0, is_long, "{letters} {profile}");

@@ -245,7 +245,7 @@ fn the_program_splits_and_merges() {
         ("render scene.json --shard 1/30", 2, "only 24 samples"),
         ("render scene.json --shard 1/3 -o a.exr", 2, "ends with .shard"),
         ("render scene.json --shard 1/3 --target-error 0.1", 2, "--shard: not with --target-error"),
-        ("render scene.json --shard 1/3 --guiding on", 2, "--shard: not with guiding"),
+        ("render scene.json --shard 1/3 --guiding", 2, "--shard: not with guiding"),
         ("render scene.json --shard 1/3 -o missing/a.shard", 5, "missing"),
     ];
     for (line, code, part) in cases {

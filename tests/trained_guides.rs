@@ -16,7 +16,7 @@ fn trained() -> tempfile::TempDir {
     room["film"] = json!({ "width": 192, "height": 192, "filter": { "type": "box" } });
     std::fs::write(folder.path().join("room.json"), room.to_string()).unwrap();
     for (name, spp) in [("a", 16), ("b", 8)] {
-        run_ok(folder.path(), &format!("render room.json --guiding on --spp {spp} --checkpoint {name}.state -o t.exr"));
+        run_ok(folder.path(), &format!("render room.json --guiding --spp {spp} --checkpoint {name}.state -o t.exr"));
     }
     folder
 }
@@ -123,7 +123,7 @@ fn files_that_hold_no_guide_are_refused() {
     let bytes = std::fs::read(dir.join("a.state")).unwrap();
     std::fs::write(dir.join("cut.state"), &bytes[..bytes.len() / 2]).unwrap();
     assert_eq!(refused(dir, "render room.json --guide cut.state", "cut.state"), 6);
-    assert_eq!(refused(dir, "render room.json --guide a.state --json a.state", "a.state"), 2);
+    assert_eq!(refused(dir, "render room.json --guide a.state --stats a.state", "a.state"), 2);
     assert_eq!(refused(dir, "render room.json --guide a.state --integrator normal", "--guide"), 2);
     assert!(std::fs::read(dir.join("a.state")).unwrap() == bytes);
 
@@ -135,6 +135,6 @@ fn files_that_hold_no_guide_are_refused() {
         "lights": [{ "type": "environment", "radiance": [1, 1, 1] }],
     });
     std::fs::write(dir.join("open.json"), open.to_string()).unwrap();
-    run_ok(dir, "render open.json --guiding on --spp 32 --checkpoint o.state -o t.exr");
+    run_ok(dir, "render open.json --guiding --spp 32 --checkpoint o.state -o t.exr");
     assert_eq!(refused(dir, "render open.json --guide o.state", "o.state: guiding did not pay"), 6);
 }

@@ -48,7 +48,7 @@ fn rerender_runs_no_option_of_the_file() {
     let address = listener.local_addr().unwrap();
     let victims = ["report", "json", "log-file", "checkpoint", "shard"];
     let mut provenance = output::read_settings(&dir.join("a.exr")).unwrap();
-    let line = "render scene.json --report report --json json --log-file log-file --checkpoint checkpoint -o shard \
+    let line = "render scene.json --report report --stats json --log-file log-file --checkpoint checkpoint -o shard \
                 --preview 0 --denoise";
     let mut arguments: Vec<String> = line.split(' ').map(str::to_owned).collect();
     arguments.extend([

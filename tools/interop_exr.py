@@ -39,7 +39,7 @@ def row(program, profile, what, good, note=""):
 
 def check(program, folder):
     for profile in PROFILES:
-        command = [program, "check-exr", folder / f"{profile}.exr", "--profile", profile, "--strict"]
+        command = [program, "check-exr", folder / f"{profile}.exr", "--profile", profile, "--fail-on-warning"]
         done = subprocess.run(command, capture_output=True, text=True)
         row("check-exr", profile, "clean", done.returncode == 0, done.stdout.splitlines()[0] if done.returncode else "")
 
@@ -126,7 +126,7 @@ def main():
         folder.mkdir(parents=True, exist_ok=True)
         for profile in PROFILES:
             command = [arguments.program, "render", arguments.scene, "-q", "--spp", "4", "--size", "160x120"]
-            command += ["--layers", LAYERS, "--exr-profile", profile, "-o", folder / f"{profile}.exr"]
+            command += ["--layers", LAYERS, "--exr", f"profile={profile}", "-o", folder / f"{profile}.exr"]
             subprocess.run(command, check=True)
         check(arguments.program, folder)
         openimageio(folder)

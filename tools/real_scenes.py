@@ -25,7 +25,7 @@ def read(path, size=None):
 def ours(program, scene, spp, size, folder):
     out, stats = os.path.join(folder, "ours.exr"), os.path.join(folder, "stats.json")
     size = f"{size[0]}x{size[1]}"
-    command = [program, "render", scene, "--spp", str(spp), "--size", size, "--float", "-q", "-o", out, "--json", stats]
+    command = [program, "render", scene, "--spp", str(spp), "--size", size, "--float", "-q", "-o", out, "--stats", stats]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
         return None, done.stderr.strip()

@@ -9,7 +9,8 @@ use std::io::Read;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
-use toml::de::{DeTable, DeValue};
+use toml::Spanned;
+use toml::de::{DeString, DeTable, DeValue};
 
 use crate::error::{Error, Result};
 use crate::file;
@@ -25,6 +26,9 @@ const PROJECT: &str = "steradian.toml";
 
 /// No configuration is longer, in bytes.
 const MAX_LENGTH: u64 = 1 << 20;
+
+/// Options of which a value is `KEY=VALUE`: files may have a table of them.
+const TABLES: [&str; 2] = ["define", "exr"];
 
 /// The value of an option, by a variable or a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -115,18 +119,37 @@ pub fn parse(file: &Path, trust: Trust, text: &str) -> Result<Vec<Entry>> {
         if entries.iter().any(|entry| entry.key == key) {
             return Err(fault(line, &format!("\"{key}\" is set twice")));
         }
-        entries.push(Entry { words: words(value).map_err(|message| fault(line, message))?, key, line });
+        let words = match value {
+            DeValue::Table(table) if TABLES.contains(&key.as_str()) => assignments(table),
+            value => words(value),
+        };
+        entries.push(Entry { words: words.map_err(|message| fault(line, message))?, key, line });
     }
     Ok(entries)
 }
 
-fn words(value: &DeValue<'_>) -> Result<Words, &'static str> {
-    let one = |value: &DeValue<'_>| match value {
+fn one(value: &DeValue<'_>) -> Result<String, &'static str> {
+    match value {
         DeValue::String(text) => Ok(text.to_string()),
         DeValue::Integer(number) => Ok(number.as_str().replace('_', "")),
         DeValue::Float(number) => Ok(number.as_str().replace('_', "")),
         _ => Err("expected a word, a number, true, false or a list of words"),
+    }
+}
+
+/// The entries of a table as the command line would have them.
+fn assignments(table: &DeTable<'_>) -> Result<Words, &'static str> {
+    let assignment = |(key, value): (&Spanned<DeString<'_>>, &Spanned<DeValue<'_>>)| {
+        let text = match value.get_ref() {
+            DeValue::Boolean(on) => on.to_string(),
+            value => one(value)?,
+        };
+        Ok(format!("{}={text}", key.get_ref()))
     };
+    table.iter().map(assignment).collect::<Result<_, _>>().map(Words::Many)
+}
+
+fn words(value: &DeValue<'_>) -> Result<Words, &'static str> {
     match value {
         DeValue::Boolean(on) => Ok(Words::Switch(*on)),
         DeValue::Array(items) => {
@@ -142,7 +165,8 @@ mod tests {
 
     #[test]
     fn entries_have_their_lines() {
-        let text = "# project\nspp = 1_000\n\nguiding = true\ntarget_error = 1e-3\nlayers = [\"Z\", \"N\"]\n";
+        let text = "# project\nspp = 1_000\n\nguiding = true\ntarget_error = 1e-3\nlayers = [\"Z\", \"N\"]\n[exr]\n\
+                    crypto_depth = 4\nprofile = \"nuke\"\nuncropped = true\n";
         let entries = parse(Path::new("s.toml"), Trust::Project, text).unwrap();
         let words = |words: &[&str]| Words::Many(words.iter().map(|word| (*word).to_owned()).collect());
         let entry = |key: &str, words: Words, line: usize| Entry { key: key.to_owned(), words, line };
@@ -151,6 +175,7 @@ mod tests {
             entry("guiding", Words::Switch(true), 4),
             entry("target-error", Words::One("1e-3".to_owned()), 5),
             entry("layers", words(&["Z", "N"]), 6),
+            entry("exr", words(&["crypto_depth=4", "profile=nuke", "uncropped=true"]), 7),
         ];
         assert_eq!(entries, expected);
         for (text, message) in [
@@ -158,6 +183,7 @@ mod tests {
             ("max_depth = 1\nspp = 2\nmax-depth = 2", "s.toml:3: \"max-depth\" is set twice"),
             ("spp =", "s.toml:1: "),
             ("\n[render]\nspp = 2", "s.toml:2: expected a word"),
+            ("exr = { profile = [1] }", "s.toml:1: expected a word"),
             ("date = 1979-05-27", "s.toml:1: expected a word"),
             ("spp = 2\noutput = 1979-05-27", "s.toml:2: \"output\" is not for a project's file"),
         ] {

@@ -60,7 +60,7 @@ pub fn slurm_scripts(job: &Job, options: &SlurmOptions) -> Result<[Script; 3]> {
 fn check_directives(job: &Job, options: &SlurmOptions) -> Result<()> {
     let folder = job.folder.to_string_lossy();
     let named = [("the job's name", Some(&*job.name)), ("--dir", Some(&*folder))];
-    let optional = [("--partition", &options.partition), ("--time", &options.time), ("--mem", &options.memory)];
+    let optional = [("--partition", &options.partition), ("--walltime", &options.time), ("--mem", &options.memory)];
     let optional = optional.into_iter().map(|(what, text)| (what, text.as_deref()));
     let further = options.further.iter().map(|text| ("--sbatch", Some(text.as_str())));
     let odd = |text: &&str| printable::line(text) != **text;
@@ -209,7 +209,7 @@ mod tests {
         assert!(refused(&Job { name: strange.into(), ..job() }, &none).contains("the job's name"));
         assert!(refused(&Job { folder: strange.into(), ..job() }, &none).contains("--dir"));
         assert!(refused(&job(), &SlurmOptions { partition: some(), ..none.clone() }).contains("--partition"));
-        assert!(refused(&job(), &SlurmOptions { time: some(), ..none.clone() }).contains("--time"));
+        assert!(refused(&job(), &SlurmOptions { time: some(), ..none.clone() }).contains("--walltime"));
         assert!(refused(&job(), &SlurmOptions { memory: some(), ..none.clone() }).contains("--mem"));
         assert!(
             refused(&job(), &SlurmOptions { further: vec![strange.to_owned()], ..none.clone() }).contains("--sbatch")

@@ -11,6 +11,7 @@ mod wording;
 pub use fingerprint::{SceneFingerprint, files_of_scene, scene_fingerprint};
 pub use foreign::{Draft, ImportOptions, ImportReport, Imported, Outcome, ReportEntry, read_scene};
 pub use scene_file::{load_scene, parse_scene, scene_as_written};
+pub use wording::describe_value;
 
 use crate::desc::SceneDesc;
 

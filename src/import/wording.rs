@@ -53,6 +53,12 @@ pub fn describe(fault: &SceneFault, scene: &Value) -> String {
     }
 }
 
+/// What is wrong with the value of a key, for the parser's message about it.
+pub fn describe_value(key: &str, value: &Value, message: String) -> String {
+    let fault = SceneFault { steps: vec![Step::Key(key.to_owned())], message, length: None };
+    describe(&fault, &serde_json::json!({ key: value }))
+}
+
 /// The message about a scene that is another value.
 pub fn no_object(scene: &Value) -> String {
     format!("expected an object {{...}}, found {}", kind_of(scene))

@@ -15,7 +15,7 @@ pub struct ExrOverrides {
     /// The loss of DWA compression.
     pub dwa_level: Option<f32>,
     /// Whether a crop is written as the whole picture.
-    pub uncropped: bool,
+    pub uncropped: Option<bool>,
     /// Shapes of a pixel in Cryptomatte layers.
     pub crypto_depth: Option<u32>,
     /// Where the names of Cryptomatte are.
@@ -24,24 +24,25 @@ pub struct ExrOverrides {
     pub owner: Option<String>,
     /// Free text.
     pub comments: Option<String>,
-    /// Of a sequence of frames.
+    /// Of a sequence of frames, for outputs that have none of their own.
+    #[serde(skip)]
     pub frames_per_second: Option<f64>,
 }
 
 impl ExrOverrides {
-    /// The name of a setting that was given, if any was.
-    pub fn given(&self) -> Option<&'static str> {
-        let given = [
-            ("exr_profile", self.profile.is_some()),
-            ("compression", self.compression.is_some()),
-            ("dwa_level", self.dwa_level.is_some()),
-            ("uncropped", self.uncropped),
-            ("crypto_depth", self.crypto_depth.is_some()),
-            ("crypto_manifest", self.crypto_manifest.is_some()),
-            ("owner", self.owner.is_some()),
-            ("comments", self.comments.is_some()),
-        ];
-        given.into_iter().find(|(_, given)| *given).map(|(name, _)| name)
+    /// These changes, and those of `others` where these have none.
+    pub fn or(self, others: Self) -> Self {
+        Self {
+            profile: self.profile.or(others.profile),
+            compression: self.compression.or(others.compression),
+            dwa_level: self.dwa_level.or(others.dwa_level),
+            uncropped: self.uncropped.or(others.uncropped),
+            crypto_depth: self.crypto_depth.or(others.crypto_depth),
+            crypto_manifest: self.crypto_manifest.or(others.crypto_manifest),
+            owner: self.owner.or(others.owner),
+            comments: self.comments.or(others.comments),
+            frames_per_second: self.frames_per_second.or(others.frames_per_second),
+        }
     }
 
     /// Changes an output.
@@ -49,7 +50,7 @@ impl ExrOverrides {
         output.profile = self.profile.unwrap_or(output.profile);
         output.compression = self.compression.or(output.compression);
         output.dwa_level = self.dwa_level.or(output.dwa_level);
-        output.uncropped |= self.uncropped;
+        output.uncropped = self.uncropped.unwrap_or(output.uncropped);
         output.crypto_depth = self.crypto_depth.or(output.crypto_depth);
         output.crypto_manifest = self.crypto_manifest.unwrap_or(output.crypto_manifest);
         output.owner = self.owner.clone().or(output.owner.take());

@@ -33,7 +33,7 @@ pub struct Overrides {
     /// Render everything in focus, as if the camera had no lens.
     pub no_depth_of_field: bool,
     /// The camera does not see light from infinity; alpha is 0 there.
-    pub transparent: bool,
+    pub transparent: Option<bool>,
     /// How samples are chosen.
     pub sampler: Option<SamplerKindDesc>,
     /// Most segments of a path, from 1: directly visible light.
@@ -62,8 +62,8 @@ pub struct Overrides {
     pub default_outputs: Vec<String>,
     /// The layers of every EXR output, beside the picture.
     pub layers: Vec<LayerKind>,
-    /// 32-bit floats in every EXR output.
-    pub float: bool,
+    /// 32-bit floats in every EXR output, or 16-bit ones.
+    pub float: Option<bool>,
     /// Of every EXR output.
     pub exr: ExrOverrides,
     /// Exposure of every PNG output, in stops.

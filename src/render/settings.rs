@@ -7,7 +7,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::integrator_overrides::integrator;
-use super::{Overrides, TrainedGuide};
+use super::{ExrOverrides, Overrides, TrainedGuide};
 use crate::accel::AccelKind;
 use crate::desc::{
     CausticsDesc, FilterDesc, IntegratorDesc, LayerKind, MAX_SIDE, OutputDesc, PixelTypeDesc, SceneDesc, ViewDesc,
@@ -94,7 +94,7 @@ impl Settings {
             overscan,
             crop: crop(desc, overrides, size, overscan)?,
             filter: desc.film.filter,
-            transparent: overrides.transparent || desc.film.transparent,
+            transparent: overrides.transparent.unwrap_or(desc.film.transparent),
             sampler: overrides.sampler.unwrap_or(desc.sampler.kind).into(),
             spp: overrides.spp.unwrap_or(if overrides.target_error.is_some() {
                 MOST_SAMPLES
@@ -241,10 +241,10 @@ fn outputs(desc: &SceneDesc, overrides: &Overrides, integrator: &IntegratorDesc)
         Ok(())
     };
     needs("layers", !overrides.layers.is_empty(), ".exr")?;
-    needs("float", overrides.float, ".exr")?;
-    if let Some(setting) = overrides.exr.given() {
-        needs(setting, true, ".exr")?;
-    }
+    needs("float", overrides.float.is_some(), ".exr")?;
+    // The frame rate of a sequence is there in any case.
+    let exr = ExrOverrides { frames_per_second: None, ..overrides.exr.clone() };
+    needs("exr", exr != ExrOverrides::default(), ".exr")?;
     needs("exposure", overrides.exposure.is_some(), ".png")?;
     needs("view", overrides.view.is_some(), ".png")?;
     if overrides.exposure.is_some_and(|stops| !stops.is_finite()) {
@@ -255,8 +255,8 @@ fn outputs(desc: &SceneDesc, overrides: &Overrides, integrator: &IntegratorDesc)
             if !overrides.layers.is_empty() {
                 output.layers.clone_from(&overrides.layers);
             }
-            if overrides.float {
-                output.pixel_type = PixelTypeDesc::Float;
+            if let Some(float) = overrides.float {
+                output.pixel_type = if float { PixelTypeDesc::Float } else { PixelTypeDesc::Half };
             }
             overrides.exr.apply(output);
             check_output(output)?;
@@ -322,13 +322,13 @@ mod tests {
             accel: Some(AccelKind::Linear),
             sampler: Some(SamplerKindDesc::Sobol),
             no_depth_of_field: true,
-            transparent: true,
+            transparent: Some(true),
             max_depth: Some(4),
             strategy: Some(StrategyDesc::Light),
             clamp: Some(2.5),
             time_limit: Some(1.5),
             layers: vec![LayerKind::Z, LayerKind::Albedo],
-            float: true,
+            float: Some(true),
             exposure: Some(-2.0),
             view: Some(ViewDesc::Filmic),
             ..Overrides::default()
@@ -426,7 +426,7 @@ mod tests {
             ("time_limit", Overrides { time_limit: Some(0.0), ..d() }),
             ("time_limit", Overrides { time_limit: Some(f64::NAN), ..d() }),
             ("layers", Overrides { layers: vec![LayerKind::Z], outputs: vec!["a.png".to_owned()], ..d() }),
-            ("float", Overrides { float: true, outputs: vec!["a.png".to_owned()], ..d() }),
+            ("float", Overrides { float: Some(true), outputs: vec!["a.png".to_owned()], ..d() }),
             ("exposure", Overrides { exposure: Some(1.0), outputs: vec!["a.exr".to_owned()], ..d() }),
             ("exposure", Overrides { exposure: Some(f32::INFINITY), ..d() }),
             ("view", Overrides { view: Some(ViewDesc::Agx), outputs: vec!["a.exr".to_owned()], ..d() }),

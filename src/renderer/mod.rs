@@ -5,6 +5,7 @@
 
 mod assignment;
 mod changes;
+mod exr_changes;
 mod job;
 mod loaded;
 mod options;
@@ -17,6 +18,7 @@ mod stop;
 mod tests;
 
 pub use assignment::{Assignment, changed_settings};
+pub use exr_changes::ExrChanges;
 pub use job::{PreparedRender, Watch};
 pub use options::layers_of;
 pub use rendering::{LayerView, Rendering};

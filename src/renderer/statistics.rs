@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::rendering::{Denoised, Rendering};
 
 impl Rendering {
-    /// Time, rays, samples and memory as one JSON object: what `steradian render --json` writes.
+    /// Time, rays, samples and memory as one JSON object: what `steradian render --stats` writes.
     pub fn statistics(&self) -> Value {
         let (settings, stats, rays) = (&self.settings, &self.stats, self.stats.rays);
         let millions_per_second =

@@ -137,10 +137,12 @@ fn peers(
 /// Every combination of what was given, named by what differs.
 fn variants(arguments: &BenchErrorArgs, desc: &SceneDesc) -> Result<Vec<Variant>> {
     let mut variants = Vec::new();
+    let given = [(true, arguments.guiding), (false, arguments.no_guiding)];
+    let guidings: Vec<bool> = given.into_iter().filter(|(_, given)| *given).map(|(guiding, _)| guiding).collect();
     for integrator in choices(&arguments.integrator) {
         for sampler in choices(&arguments.sampler) {
             for strategy in choices(&arguments.strategy) {
-                for guiding in choices(&arguments.guiding) {
+                for guiding in choices(&guidings) {
                     for accel in choices(&arguments.accel) {
                         let overrides = Overrides {
                             integrator,
@@ -160,7 +162,7 @@ fn variants(arguments: &BenchErrorArgs, desc: &SceneDesc) -> Result<Vec<Variant>
                             part(&arguments.sampler, sampler.and_then(name)),
                             part(&arguments.strategy, strategy.and_then(name)),
                             part(
-                                &arguments.guiding,
+                                &guidings,
                                 guiding.map(|on| if on { "guided".to_owned() } else { "not guided".to_owned() }),
                             ),
                             part(&arguments.accel, accel.map(|accel| accel.to_string())),

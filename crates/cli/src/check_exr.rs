@@ -35,10 +35,10 @@ pub fn run(arguments: &CheckExrArgs) -> Result<u8> {
         text::print_json(&Value::Array(values))?;
     } else {
         let rules = by_rule(&broken);
-        let found = rules.iter().flat_map(|findings| describe(findings, arguments.files.len(), arguments.verbose));
+        let found = rules.iter().flat_map(|findings| describe(findings, arguments.files.len(), arguments.verbose > 0));
         text::print(&clean_lines(&clean, arguments).into_iter().chain(found).collect::<Vec<_>>().join("\n"))?;
     }
-    let fails = worst == Some(Severity::Error) || (arguments.strict && worst.is_some());
+    let fails = worst == Some(Severity::Error) || (arguments.fail_on_warning && worst.is_some());
     Ok(if fails { BROKEN } else { 0 })
 }
 
@@ -46,7 +46,7 @@ pub fn run(arguments: &CheckExrArgs) -> Result<u8> {
 fn clean_lines(clean: &[String], arguments: &CheckExrArgs) -> Vec<String> {
     let profile = arguments.profile.name();
     match clean {
-        [_, _, ..] if !arguments.verbose => vec![format!("{} files: clean for the profile {profile}", clean.len())],
+        [_, _, ..] if arguments.verbose == 0 => vec![format!("{} files: clean for the profile {profile}", clean.len())],
         _ => clean.iter().map(|name| format!("{name}: clean for the profile {profile}")).collect(),
     }
 }

@@ -4,14 +4,13 @@ use steradian::Result;
 use steradian::internal::convert::{self, Originals};
 use steradian::internal::output::FileUses;
 
-use crate::args::{ConvertArgs, Verbosity};
+use crate::args::ConvertArgs;
 use crate::log::{self, Level};
 use crate::{files, scene};
 
 /// Reads a scene of any format and writes it as JSON.
 pub fn run(arguments: &ConvertArgs, mut uses: FileUses) -> Result<()> {
-    let verbosity = Verbosity { quiet: arguments.quiet, verbose: arguments.verbose };
-    let imported = scene::load(&arguments.input, &arguments.import, verbosity)?;
+    let imported = scene::load(&arguments.input, &arguments.import, arguments.verbosity)?;
     let originals = if arguments.link { Originals::Link } else { Originals::Copy };
     arguments
         .import
@@ -20,7 +19,7 @@ pub fn run(arguments: &ConvertArgs, mut uses: FileUses) -> Result<()> {
         .filter(|path| !files::is_stdout(path))
         .try_for_each(|path| uses.write(path, "--report"))?;
     let count = convert::write_scene(&imported, &arguments.input, &arguments.output, originals, uses)?;
-    if !arguments.quiet {
+    if !arguments.verbosity.quiet {
         let files = if count == 1 { "1 file".to_owned() } else { format!("{count} files") };
         log::message(Level::Note, &format!("wrote {} and {files} beside it", arguments.output.display()));
     }

@@ -33,7 +33,7 @@ fn slurm(arguments: &SlurmArgs, mut uses: FileUses) -> Result<()> {
     let job = job(&arguments.job)?;
     let options = SlurmOptions {
         partition: arguments.partition.clone(),
-        time: arguments.time.clone(),
+        time: arguments.walltime.clone(),
         cpus: arguments.cpus,
         memory: arguments.mem.clone(),
         further: arguments.sbatch.clone(),

@@ -34,7 +34,7 @@ impl<'a> NamedFiles<'a> {
             Command::Render(arguments) => {
                 self.read.push((&arguments.scene, SCENE));
                 self.add_outputs(&arguments.output);
-                let named = [(&arguments.json, "--json"), (&arguments.state.checkpoint, "--checkpoint")];
+                let named = [(&arguments.stats, "--stats"), (&arguments.state.checkpoint, "--checkpoint")];
                 self.written.extend(named.into_iter().filter_map(|(path, option)| Some((path.clone()?, option))));
                 self.import = Some(&arguments.import);
             }
@@ -159,12 +159,12 @@ pub fn of_render(
         let statistics_of = |path: &PathBuf| {
             frame.map_or_else(|| path.clone(), |frame| file_of_frame(&path.to_string_lossy(), frame).into())
         };
-        statistics.extend(arguments.json.iter().filter(|path| !is_stdout(path)).map(statistics_of));
+        statistics.extend(arguments.stats.iter().filter(|path| !is_stdout(path)).map(statistics_of));
     }
     if let Some(guide) = &arguments.guide {
         uses.read(guide, "--guide")?;
     }
-    written.extend(statistics.into_iter().map(|path| (path, "--json")));
+    written.extend(statistics.into_iter().map(|path| (path, "--stats")));
     written
         .extend(arguments.import.report.iter().filter(|path| !is_stdout(path)).map(|path| (path.clone(), "--report")));
     written.iter().try_for_each(|(path, purpose)| uses.write(path, *purpose))?;

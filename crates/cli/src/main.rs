@@ -108,7 +108,7 @@ fn run(cli: Cli, uses: FileUses) -> Result<u8> {
         Command::View(arguments) => view::run(&arguments).map(|()| 0),
         Command::Completions { shell } => {
             let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Cli::command(), "steradian", &mut script);
+            clap_complete::generate(shell, &mut args::command_line(), "steradian", &mut script);
             text::print_as_it_is(String::from_utf8_lossy(&script).trim_end()).map(|()| 0)
         }
     }
@@ -126,11 +126,11 @@ fn start_threads() -> Result<()> {
 fn man(folder: Option<&Path>) -> Result<()> {
     let Some(folder) = folder else {
         let mut page = Vec::new();
-        let rendered = clap_mangen::Man::new(Cli::command()).render(&mut page);
+        let rendered = clap_mangen::Man::new(args::command_line()).render(&mut page);
         rendered.map_err(|e| Error::Internal(e.to_string()))?;
         return text::print_as_it_is(String::from_utf8_lossy(&page).trim_end());
     };
-    let written = std::fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(Cli::command(), folder));
+    let written = std::fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(args::command_line(), folder));
     written.map_err(|e| Error::Output { file: folder.to_owned(), message: e.to_string() })
 }
 

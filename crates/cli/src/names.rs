@@ -30,6 +30,10 @@ impl Error for Names {
     fn unknown_variant(_: &str, expected: &'static [&'static str]) -> Self {
         Self(expected)
     }
+
+    fn unknown_field(_: &str, expected: &'static [&'static str]) -> Self {
+        Self(expected)
+    }
 }
 
 fn from_name<T: DeserializeOwned>(name: &str) -> Result<T, Names> {
@@ -96,6 +100,28 @@ fn values<T: JsonSchema>(names: &'static [&'static str]) -> Vec<PossibleValue> {
     names.iter().map(|name| PossibleValue::new(*name).help(about(name).unwrap_or_default())).collect()
 }
 
+/// A key with its description, and its values with theirs if it has only some.
+type DescribedKey = (&'static str, String, Vec<(String, String)>);
+
+/// The keys of `T`, as the scene format describes them in `D`.
+pub fn keys<D: JsonSchema, T: DeserializeOwned>() -> Vec<DescribedKey> {
+    let schema = serde_json::to_value(schemars::schema_for!(D)).unwrap_or_default();
+    let unknown: MapDeserializer<'_, _, Names> = MapDeserializer::new([("?", "")].into_iter());
+    let names = T::deserialize(unknown).err().map_or(&[][..], |Names(names)| names);
+    let described = |name: &&'static str| {
+        let key = &schema["properties"][*name];
+        let about = key["description"].as_str().unwrap_or_default().replace('\n', " ");
+        let about = about.trim_start_matches("EXR: ").trim_end_matches('.').to_owned();
+        // Optional keys have the reference within "anyOf".
+        let reference = key["$ref"].as_str().or_else(|| key["anyOf"][0]["$ref"].as_str());
+        let variants = reference.and_then(|place| schema.pointer(place.trim_start_matches('#'))?["oneOf"].as_array());
+        let text = |value: &Value| value.as_str().unwrap_or_default().trim_end_matches('.').to_owned();
+        let variant = |value: &Value| (text(&value["const"]), text(&value["description"]));
+        (*name, about, variants.map_or_else(Vec::new, |variants| variants.iter().map(variant).collect()))
+    };
+    names.iter().map(described).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -112,6 +138,18 @@ mod tests {
         ];
         assert!(all.iter().flatten().all(|help| !help.is_empty()), "{all:?}");
         assert_eq!(all[0][1], "Shading normal in world space; zero where nothing was hit");
+    }
+
+    #[test]
+    fn keys_have_descriptions_and_values() {
+        let keys = keys::<steradian::desc::OutputDesc, steradian::ExrOverrides>();
+        let names: Vec<_> = keys.iter().map(|(name, ..)| *name).collect();
+        assert_eq!(names[..4], ["profile", "compression", "dwa_level", "uncropped"]);
+        assert!(keys.iter().all(|(_, about, values)| {
+            !about.is_empty() && values.iter().all(|(value, about)| !value.is_empty() && !about.is_empty())
+        }));
+        let count: Vec<_> = keys.iter().map(|(.., values)| values.len()).collect();
+        assert_eq!(count, [4, 7, 0, 0, 0, 2, 0, 0]);
     }
 
     #[test]

@@ -83,7 +83,7 @@ struct Plan<'a> {
 impl<'a> Plan<'a> {
     /// Checks all that can be checked before the scene is made; `None` if the frame is there already.
     fn new(arguments: &'a RenderArgs, shot: &Shot, session: &Session) -> Result<Option<Self>> {
-        let json = arguments.json.as_deref().map(|path| shot.file(path));
+        let json = arguments.stats.as_deref().map(|path| shot.file(path));
         let mut overrides = arguments.overrides(default_outputs(&arguments.scene));
         let shard_name = kept::take_shard_name(&arguments.state, &arguments.scene, &mut overrides)?;
         let shard_file = shard_name.as_deref().map(|name| shot.file_of(name));
@@ -207,7 +207,7 @@ fn write_statistics(path: &Path, value: &Value) -> Result<()> {
 
 /// Names that are given, and not after the scene, have no place for a frame's number.
 fn check_names(arguments: &RenderArgs, settings: &Settings) -> Result<()> {
-    let state = [&arguments.state.checkpoint, &arguments.json].into_iter().flatten().filter_map(|path| path.to_str());
+    let state = [&arguments.state.checkpoint, &arguments.stats].into_iter().flatten().filter_map(|path| path.to_str());
     let defaults = default_outputs(&arguments.scene);
     let outputs = settings
         .outputs

@@ -109,7 +109,7 @@ fn film(header: &Header, file: &Path) -> Result<Film> {
 fn guided_state(file: &Path) -> Result<(RenderState, Option<Guide>)> {
     let mut reader = Reader::open(file)?;
     if !reader.header().is_guided() {
-        return Err(reader.fault("it is the state of a render without --guiding on, and holds no guide"));
+        return Err(reader.fault("it is the state of a render without --guiding, and holds no guide"));
     }
     let film = film(reader.header(), file)?;
     let planner = Planner::Guided(Box::new(GuidedPlanner::new(&film)?));

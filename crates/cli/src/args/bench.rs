@@ -78,22 +78,22 @@ pub struct BenchStabilityArgs {
     /// Checks (A3) or groups of checks (B). Default: all
     #[arg(value_name = "ID")]
     pub checks: Vec<String>,
-    /// Fewer rays and samples: about a second a check
+    /// Take less time: fewer rays and samples, about a second a check
     #[arg(long)]
     pub quick: bool,
     /// List the checks and run none
     #[arg(long)]
     pub list: bool,
-    /// Folder for stability.html, stability.md and stability.json; without it the table goes to stdout
+    /// Folder for the report: stability.html, stability.md and stability.json; without it the table goes to stdout
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Keep what an earlier, interrupted run of the same program left in DIR
+    /// Continue an interrupted run: keep what it left in DIR, if it was of the same program
     #[arg(long, requires = "out")]
     pub resume: bool,
-    /// Without --out: print JSON instead of a table
+    /// Print JSON instead of a table; without --out
     #[arg(long)]
     pub json: bool,
-    /// Print only results and errors
+    /// Print only errors; results go to stdout
     #[arg(short, long)]
     pub quiet: bool,
 }
@@ -101,22 +101,22 @@ pub struct BenchStabilityArgs {
 /// Arguments of `bench reports`.
 #[derive(Debug, Args)]
 pub struct BenchReportsArgs {
-    /// Width and height of the pictures
+    /// Width and height in pixels
     #[arg(long, value_name = "WxH", default_value = "1200x800", value_parser = parse_size)]
     pub size: [u32; 2],
-    /// Frames of each accelerator
+    /// Rounds of measurement: frames of each accelerator
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub rounds: u32,
     /// Render full frames even where every triangle is tested: hours in place of seconds
     #[arg(long)]
     pub full: bool,
-    /// Folder for reports.html, reports.md and reports.json; without it tables go to stdout
+    /// Folder for the report: reports.html, reports.md and reports.json; without it tables go to stdout
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Without --out: print JSON instead of tables
+    /// Print JSON instead of tables; without --out
     #[arg(long)]
     pub json: bool,
-    /// Print only results and errors
+    /// Print only errors; results go to stdout
     #[arg(short, long)]
     pub quiet: bool,
 }
@@ -128,7 +128,7 @@ pub struct BenchAccelArgs {
     pub scenes: Vec<PathBuf>,
     #[command(flatten)]
     pub import: ImportArgs,
-    /// Accelerators, with options such as embree:high. Default: embree,bvh,kdtree,octree,linear
+    /// Ray accelerator, with options such as embree:high. Default: embree,bvh,kdtree,octree,linear
     #[arg(long, value_name = "LIST", value_delimiter = ',', long_help = accel_help())]
     pub accel: Vec<AccelKind>,
     /// Rays of each kind, about
@@ -139,25 +139,25 @@ pub struct BenchAccelArgs {
         )
     ]
     pub rays: u32,
-    /// Numbers of threads. Default: 1 and all
+    /// Number of threads; several one after another. Default: 1 and all
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub threads: Vec<u32>,
-    /// Rounds after the one that warms up
+    /// Rounds of measurement, after one that warms up
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub rounds: u32,
     /// Also measure a generated mesh with growing numbers of triangles, such as 1e3..1e7
     #[arg(long, value_name = "FROM..TO", value_parser = parse_range)]
     pub scaling: Option<[usize; 2]>,
-    /// Folder for accel.html, accel.md, accel.csv and accel.json; without it tables go to stdout
+    /// Folder for the report: accel.html, accel.md, accel.csv and accel.json; without it tables go to stdout
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Without --out: print JSON instead of tables
+    /// Print JSON instead of tables; without --out
     #[arg(long)]
     pub json: bool,
     /// Trace only this ray and print each accelerator's hit
     #[arg(long, value_name = "OX,OY,OZ,DX,DY,DZ[,TMIN[,TMAX[,TIME]]]", allow_hyphen_values = true)]
     pub ray: Option<String>,
-    /// Print only results and errors
+    /// Print only errors; results go to stdout
     #[arg(short, long)]
     pub quiet: bool,
 }

@@ -8,7 +8,7 @@ use steradian::internal::accel::AccelKind;
 use steradian_bench::error::Peer;
 
 use super::import::ImportArgs;
-use super::{accel_help, parse_size, parse_switch};
+use super::{accel_help, parse_size};
 use crate::names;
 
 pub const ABOUT: &str = "\
@@ -67,7 +67,7 @@ pub struct BenchErrorArgs {
     #[arg(long)]
     pub tax: bool,
 
-    /// Algorithms
+    /// The algorithm; several for as many variants
     #[
         arg(
             long, value_name = "LIST", value_delimiter = ',', value_parser = names::tagged::<IntegratorDesc>(),
@@ -75,7 +75,7 @@ pub struct BenchErrorArgs {
         )
     ]
     pub integrator: Vec<IntegratorDesc>,
-    /// How samples are chosen
+    /// Sampler: how samples are chosen
     #[
         arg(
             long, value_name = "LIST", value_delimiter = ',', value_parser = names::plain::<SamplerKindDesc>(),
@@ -83,7 +83,7 @@ pub struct BenchErrorArgs {
         )
     ]
     pub sampler: Vec<SamplerKindDesc>,
-    /// How directions towards lights are found
+    /// Light sampling: by lights, by materials, or both weighted by multiple importance sampling
     #[
         arg(
             long, value_name = "LIST", value_delimiter = ',', value_parser = names::plain::<StrategyDesc>(),
@@ -91,9 +91,12 @@ pub struct BenchErrorArgs {
         )
     ]
     pub strategy: Vec<StrategyDesc>,
-    /// Whether paths learn where light comes from: on, off or both
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_switch, help_heading = "Variants")]
-    pub guiding: Vec<bool>,
+    /// Path guiding: sample directions by the incident radiance learned from earlier paths
+    #[arg(long, help_heading = "Variants")]
+    pub guiding: bool,
+    /// No path guiding, whatever the scene sets; with --guiding a variant of either kind
+    #[arg(long, help_heading = "Variants")]
+    pub no_guiding: bool,
     /// Ray accelerator
     #[arg(long, value_name = "LIST", value_delimiter = ',', long_help = accel_help(), help_heading = "Variants")]
     pub accel: Vec<AccelKind>,
@@ -129,17 +132,17 @@ pub struct BenchErrorArgs {
     /// Number of threads; 0 means all
     #[arg(long, value_name = "N", help_heading = "Render")]
     pub threads: Option<usize>,
-    /// Seed of the first repeat
+    /// Seed of the noise, in the first repetition
     #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Render")]
     pub seed: u64,
 
-    /// Folder for error.html, error.md, error.csv and error.json; without it tables go to stdout
+    /// Folder for the report: error.html, error.md, error.csv and error.json; without it tables go to stdout
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     pub out: Option<PathBuf>,
-    /// Without --out: print JSON instead of tables
+    /// Print JSON instead of tables; without --out
     #[arg(long, help_heading = "Output")]
     pub json: bool,
-    /// Print only results and errors
+    /// Print only errors; results go to stdout
     #[arg(short, long, help_heading = "Output")]
     pub quiet: bool,
     #[command(flatten)]

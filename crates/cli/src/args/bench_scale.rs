@@ -34,13 +34,13 @@ pub struct BenchScaleArgs {
     /// The sweeps to run. Default: all, one after another
     #[arg(value_name = "SWEEP", value_parser = sweeps())]
     pub sweeps: Vec<String>,
-    /// Smaller scenes and pictures
+    /// Take less time: smaller scenes and pictures
     #[arg(long)]
     pub quick: bool,
-    /// Repeats, all cases in turn
+    /// Repetitions, all cases in turn
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeat: u32,
-    /// Width and height of pictures. Default: 512x512, 128x128 with --quick
+    /// Width and height in pixels. Default: 512x512, 128x128 with --quick
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<[u32; 2]>,
     /// Samples per pixel
@@ -61,13 +61,13 @@ pub struct BenchScaleArgs {
     /// Ray accelerator
     #[arg(long, value_name = "NAME", default_value = "embree", long_help = accel_help())]
     pub accel: AccelKind,
-    /// Folder for scale.html, scale.md, scale.csv and scale.json; without it tables go to stdout
+    /// Folder for the report: scale.html, scale.md, scale.csv and scale.json; without it tables go to stdout
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Without --out: print JSON instead of tables
+    /// Print JSON instead of tables; without --out
     #[arg(long)]
     pub json: bool,
-    /// Print only results and errors
+    /// Print only errors; results go to stdout
     #[arg(short, long)]
     pub quiet: bool,
 }

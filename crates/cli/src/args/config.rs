@@ -13,6 +13,7 @@ $XDG_CONFIG_HOME/steradian/config.toml (or ~/.config/...); in the scene. Keys of
   threads = 8
   layers = [\"Z\", \"albedo\"]
   float = true
+  exr = { profile = \"nuke\", compression = \"piz\" }
 
 steradian.toml sets what the picture is; what is loaded, written or connected to (output, oidn-library, log-file, tev, \
 preview, ...) belongs to the other places. Files of other users than you and root are not read.
@@ -37,7 +38,7 @@ pub struct ConfigShowArgs {
     /// Also where each value comes from
     #[arg(long)]
     pub origin: bool,
-    /// As JSON, with origins
+    /// Print JSON, with origins
     #[arg(long)]
     pub json: bool,
 }

@@ -58,8 +58,8 @@ pub struct DenoiseArgs {
     pub input: PathBuf,
     /// The file to write, .exr; #### is replaced by the same number
     pub output: PathBuf,
-    /// Further file to write, .png; repeat for several
-    #[arg(short = 'o', long = "output", alias = "png", value_name = "FILE.png")]
+    /// File to write, .png, besides; repeat for several
+    #[arg(short = 'o', long = "output", value_name = "FILE.png")]
     pub also: Vec<PathBuf>,
     /// The layer that holds the albedo: its name before the dot
     #[arg(long, value_name = "LAYER")]
@@ -82,11 +82,11 @@ pub struct DenoiseArgs {
     ]
     pub view: ViewDesc,
     /// Number of threads; 0 means all
-    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Run")]
+    #[arg(short = 't', long, value_name = "N", default_value_t = 0, help_heading = "Run")]
     pub threads: usize,
     #[command(flatten)]
     pub oidn: OidnArgs,
-    /// Print what was done as JSON, an object a file
+    /// Print JSON: what was done, an object a file
     #[arg(long, help_heading = "Run")]
     pub json: bool,
     /// Print only errors

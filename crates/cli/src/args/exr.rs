@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
-use steradian::desc::{CompressionDesc, CryptoManifestDesc, ExrProfileDesc};
+use clap::{ArgAction, Args};
+use steradian::desc::{ExrProfileDesc, OutputDesc};
 use steradian::internal::render::ExrOverrides;
 
 use super::denoise::OidnArgs;
@@ -13,7 +13,7 @@ pub const CHECK_EXAMPLES: &str = "\
 Examples:
   steradian check-exr shot.exr --profile nuke
       Whether Nuke reads the file as it is meant.
-  steradian check-exr frames/*.exr --strict && echo clean
+  steradian check-exr frames/*.exr --fail-on-warning && echo clean
       Exit code 1 for warnings, too.
 
 Exit codes: 0 no errors, 1 rules are broken, 3 no EXR file, 4 missing.";
@@ -27,51 +27,18 @@ Examples:
   steradian rerender shot.exr -o now.exr --allow-changed
       With the scene as it is today.";
 
-/// How EXR files are written.
-#[derive(Clone, Debug, Default, Args)]
-#[command(next_help_heading = "EXR files")]
-pub struct ExrArgs {
-    /// EXR profile: channel names, parts and compression for one application
-    #[arg(long, value_name = "PROFILE", value_parser = names::plain::<ExrProfileDesc>())]
-    pub exr_profile: Option<ExrProfileDesc>,
-    /// EXR: compression. dwaa and dwab lose a little, and are only for colour
-    #[arg(long, value_name = "NAME", value_parser = names::plain::<CompressionDesc>())]
-    pub compression: Option<CompressionDesc>,
-    /// EXR: how much dwaa and dwab lose; 45 unless given
-    #[arg(long, value_name = "LEVEL")]
-    pub dwa_level: Option<f32>,
-    /// EXR: store the whole picture, black around the crop, for programs that ignore data windows
-    #[arg(long)]
-    pub uncropped: bool,
-    /// EXR: Cryptomatte ranks, the number of objects stored per pixel. Default: 6
-    #[arg(long, value_name = "N")]
-    pub crypto_depth: Option<u32>,
-    /// EXR: where Cryptomatte's names are stored: in the file or beside it
-    #[arg(long, value_name = "PLACE", value_parser = names::plain::<CryptoManifestDesc>())]
-    pub crypto_manifest: Option<CryptoManifestDesc>,
-    /// EXR: the attribute owner
-    #[arg(long, value_name = "TEXT")]
-    pub owner: Option<String>,
-    /// EXR: text to prepend to the attribute comments
-    #[arg(long, value_name = "TEXT")]
-    pub comments: Option<String>,
-}
-
-impl ExrArgs {
-    /// What the settings need of it; `frames_per_second` is that of a sequence.
-    pub fn overrides(&self, frames_per_second: Option<f64>) -> ExrOverrides {
-        ExrOverrides {
-            profile: self.exr_profile,
-            compression: self.compression,
-            dwa_level: self.dwa_level,
-            uncropped: self.uncropped,
-            crypto_depth: self.crypto_depth,
-            crypto_manifest: self.crypto_manifest,
-            owner: self.owner.clone(),
-            comments: self.comments.clone(),
-            frames_per_second,
-        }
+/// The help of `--exr`: every key with its meaning and its values.
+pub fn exr_help() -> String {
+    let mut help =
+        "EXR files: set keys of the scene's outputs, such as profile=nuke,compression=piz; repeat for more\n\n\
+                    A comma in the text of owner or comments is a part of it. In configuration files these are keys of \
+                    the table exr.\n"
+            .to_owned();
+    for (key, about, values) in names::keys::<OutputDesc, ExrOverrides>() {
+        help.push_str(&format!("\n  {key:<17}{about}"));
+        values.iter().for_each(|(value, about)| help.push_str(&format!("\n    {value:<15}{about}")));
     }
+    help
 }
 
 /// Arguments of `check-exr`.
@@ -85,11 +52,11 @@ pub struct CheckExrArgs {
     pub profile: ExrProfileDesc,
     /// Warnings count as errors
     #[arg(long)]
-    pub strict: bool,
-    /// Name every place that breaks a rule, not only the first three
-    #[arg(short, long)]
-    pub verbose: bool,
-    /// As JSON, with every place
+    pub fail_on_warning: bool,
+    /// Print more messages: every place that breaks a rule, not only the first three
+    #[arg(short, long, action = ArgAction::Count)]
+    pub verbose: u8,
+    /// Print JSON, with every place
     #[arg(long)]
     pub json: bool,
 }
@@ -109,14 +76,14 @@ pub struct RerenderArgs {
     /// Render even if the scene or its files have changed
     #[arg(long)]
     pub allow_changed: bool,
-    /// The checkpoint with the guide of a picture that was rendered with --guide
+    /// Guide paths by what another render has learned: its --checkpoint, for a picture that was rendered with --guide
     #[arg(long, value_name = "FILE")]
     pub guide: Option<PathBuf>,
-    /// Other samples per pixel
-    #[arg(long, value_name = "N")]
+    /// Samples per pixel, in place of those of the picture
+    #[arg(short = 's', long, value_name = "N")]
     pub spp: Option<u32>,
     /// Number of threads; 0 means all
-    #[arg(long, value_name = "N")]
+    #[arg(short = 't', long, value_name = "N")]
     pub threads: Option<usize>,
     #[command(flatten)]
     pub oidn: OidnArgs,

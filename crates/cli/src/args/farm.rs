@@ -19,7 +19,7 @@ const SLURM_EXAMPLES: &str = "\
 Examples:
   steradian farm slurm room.json --shards 16 --cpus 32 --submit
       One picture on 16 nodes with 32 processors each.
-  steradian farm slurm room.json --shards 4 --frames 1-100 -o out/room.####.exr --partition night --time 4:00:00
+  steradian farm slurm room.json --shards 4 --frames 1-100 -o out/room.####.exr --partition night --walltime 4:00:00
       100 frames of 4 shards each; look at room.farm/*.sh, then run room.farm/submit.sh.
   steradian farm slurm room.json --shards 8 -- --spp 4096 --layers Z,N
       Options of render follow the two dashes.";
@@ -60,17 +60,17 @@ pub struct JobArgs {
     /// Samples per pixel, all shards together
     #[arg(long, value_name = "N")]
     pub spp: Option<u32>,
-    /// Folder for shards and checkpoints; has to be the same for all machines. Default: SCENE.farm in the working
-    /// directory
+    /// Folder to write to: shards and checkpoints. It has to be the same for all machines. Default: SCENE.farm in the
+    /// working directory
     #[arg(long, value_name = "DIR")]
     pub dir: Option<PathBuf>,
-    /// Seconds between checkpoints
+    /// Write the checkpoint at least this often
     #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
     pub every: u32,
     /// The program's path on the machines. Default: this one
     #[arg(long, value_name = "FILE")]
     pub program: Option<PathBuf>,
-    /// Render frames whose files exist, too; they are skipped otherwise
+    /// Overwrite existing frames; default: skip them
     #[arg(long)]
     pub overwrite: bool,
     /// Options of `steradian render` for every shard
@@ -88,7 +88,7 @@ pub struct SlurmArgs {
     pub partition: Option<String>,
     /// Time limit of a shard, as sbatch has it: 2:00:00. At the limit it writes its checkpoint and is queued again
     #[arg(long, value_name = "TIME", help_heading = "Slurm")]
-    pub time: Option<String>,
+    pub walltime: Option<String>,
     /// Processors of a shard; render has as many threads
     #[arg(long, value_name = "N", help_heading = "Slurm")]
     pub cpus: Option<u32>,

@@ -2,8 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::{ArgAction, Args};
+use clap::Args;
 use steradian::internal::import::ImportOptions;
+
+use super::Verbosity;
 
 /// How scenes of other renderers are read.
 #[derive(Clone, Debug, Default, Args)]
@@ -55,12 +57,8 @@ pub struct ConvertArgs {
     pub link: bool,
     #[command(flatten)]
     pub import: ImportArgs,
-    /// Print only errors
-    #[arg(short, long, conflicts_with = "verbose")]
-    pub quiet: bool,
-    /// Report every parameter
-    #[arg(short, long, action = ArgAction::Count)]
-    pub verbose: u8,
+    #[command(flatten)]
+    pub verbosity: Verbosity,
 }
 
 fn parse_define(text: &str) -> Result<(String, String), String> {

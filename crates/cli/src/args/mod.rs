@@ -14,18 +14,20 @@ mod frames;
 mod import;
 mod live;
 mod log;
+mod opposites;
 mod state;
 mod texts;
+mod values;
 mod view;
 
 use std::path::PathBuf;
 
 use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
-use steradian::Assignment;
 use steradian::desc::{CausticsDesc, IntegratorDesc, RouletteDesc, SamplerKindDesc, StrategyDesc, ViewDesc};
 use steradian::internal::accel::AccelKind;
-use steradian::internal::render::Overrides;
+use steradian::internal::render::{ExrOverrides, Overrides};
+use steradian::{Assignment, ExrChanges};
 
 use crate::names::{self, Layers};
 use crate::rerender::Repeat;
@@ -37,15 +39,17 @@ pub use bench_error::BenchErrorArgs;
 pub use bench_scale::BenchScaleArgs;
 pub use config::{ConfigCommand, ConfigShowArgs};
 pub use denoise::{DenoiseArgs, RenderDenoiseArgs};
-pub use exr::{CheckExrArgs, ExrArgs, RerenderArgs};
+pub use exr::{CheckExrArgs, RerenderArgs};
 pub use farm::{FarmCommand, JobArgs, SlurmArgs};
 pub use frames::SequenceArgs;
 pub use import::{ConvertArgs, ImportArgs};
 pub use log::{ColorChoice, LogArgs, LogFormat};
+pub use opposites::opposite;
 use state::MERGE_EXAMPLES;
 pub use state::{MergeArgs, StateArgs};
 pub use texts::FIRST_STEPS;
 use texts::{EXAMPLES, RENDER_EXAMPLES, RENDER_SHORT_EXAMPLES};
+use values::{accel_help, parse_list, parse_size};
 pub use view::ViewArgs;
 
 /// Options of `render` that `-h` shows; `--help` shows all.
@@ -65,7 +69,7 @@ const COMMON_OPTIONS: [&str; 21] = [
     "accel",
     "threads",
     "time_limit",
-    "json",
+    "stats",
     "checkpoint",
     "resume",
     "preview",
@@ -73,10 +77,10 @@ const COMMON_OPTIONS: [&str; 21] = [
     "overwrite",
 ];
 
-/// The command line as it is parsed: the options that few need are absent from `-h`.
+/// The command line as it is parsed: the options that few need are absent from `-h`, and switches have opposites.
 pub fn command_line() -> clap::Command {
     Cli::command().mut_subcommand("render", |render| {
-        render.mut_args(|arg| {
+        opposites::added(render).mut_args(|arg| {
             let is_common = ["quiet", "verbose", "help"].iter().chain(&COMMON_OPTIONS).any(|id| arg.get_id() == *id);
             arg.hide_short_help(!is_common)
         })
@@ -114,7 +118,7 @@ pub enum Command {
     /// Editors check and complete scenes with it: save it and name it in the scene's "$schema".
     #[command(after_help = "Example:\n  steradian schema > scene.schema.json")]
     Schema {
-        /// Write the manual of the scene format as Markdown pages into this folder instead
+        /// Write Markdown pages into this folder instead: the manual of the scene format
         #[arg(long, value_name = "DIR")]
         markdown: Option<PathBuf>,
     },
@@ -178,10 +182,10 @@ pub enum Command {
     /// Print the manual page, or write those of all commands into a folder
     #[command(after_help = "Example:\n  steradian man --dir ~/.local/share/man/man1")]
     Man {
-        /// The folder.
+        /// Folder to write to: the manual pages of all commands
         #[arg(long, value_name = "DIR")]
         dir: Option<PathBuf>,
-        /// Write the reference of all commands as Markdown pages into this folder instead
+        /// Write Markdown pages into this folder instead: the reference of all commands
         #[arg(long, value_name = "DIR", conflicts_with = "dir")]
         markdown: Option<PathBuf>,
     },
@@ -232,6 +236,12 @@ pub struct RenderArgs {
     /// EXR: store 32-bit floats instead of 16-bit ones
     #[arg(long, help_heading = "Picture")]
     pub float: bool,
+    /// The opposite of --float
+    #[arg(long, hide = true)]
+    pub no_float: bool,
+    /// EXR files: set keys of the scene's outputs, such as profile=nuke,compression=piz; repeat for more
+    #[arg(long, value_name = "KEY=VALUE,...", long_help = exr::exr_help(), help_heading = "Picture")]
+    pub exr: Vec<ExrChanges>,
     /// PNG: exposure in stops; 1 is twice as bright
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true, help_heading = "Picture")]
     pub exposure: Option<f32>,
@@ -279,17 +289,12 @@ pub struct RenderArgs {
     /// samples of those before, and weighted by its inverse variance. Guiding ends where it does not pay. With
     /// --checkpoint and --resume the picture is the same bit for bit. Unsupported with --shard: each part would have to
     /// render nearly all samples to train the guide; --guide uses a trained one.
-    #[
-        arg(
-            long, value_name = "on|off", num_args = 0..=1, default_missing_value = "on", value_parser = parse_switch,
-            help_heading = "Algorithm"
-        )
-    ]
-    pub guiding: Option<bool>,
-    /// Do not guide paths, whatever the scene sets
-    #[arg(long, conflicts_with = "guiding", help_heading = "Algorithm")]
+    #[arg(long, help_heading = "Algorithm")]
+    pub guiding: bool,
+    /// The opposite of --guiding
+    #[arg(long, hide = true)]
     pub no_guiding: bool,
-    /// Guide paths by what another render has learned: the --checkpoint of one with --guiding on
+    /// Guide paths by what another render has learned: the --checkpoint of one with --guiding
     ///
     /// The guide is not trained further, whatever --guiding says. Samples then depend on it alone, so that --shard,
     /// --pixel, --target-error and --resume with more samples work as without guiding. The scene, the camera and the
@@ -315,6 +320,9 @@ pub struct RenderArgs {
     /// Do not show the background to the camera: alpha is 0 there
     #[arg(long, help_heading = "Picture")]
     pub transparent: bool,
+    /// The opposite of --transparent
+    #[arg(long, hide = true)]
+    pub no_transparent: bool,
     /// Ray accelerator: auto, embree, packets, bvh, kdtree, octree or linear, with options such as embree:high
     #[arg(long, value_name = "NAME", long_help = accel_help(), help_heading = "Algorithm")]
     pub accel: Option<AccelKind>,
@@ -326,16 +334,15 @@ pub struct RenderArgs {
     #[arg(long, value_name = "SECONDS", help_heading = "Run")]
     pub time_limit: Option<f64>,
     /// Write statistics as JSON to this file; - for stdout
-    #[arg(long, value_name = "STATS", help_heading = "Run")]
-    pub json: Option<PathBuf>,
+    // Scripts know it by its earlier name.
+    #[arg(long, alias = "json", value_name = "FILE", help_heading = "Run")]
+    pub stats: Option<PathBuf>,
     /// Replay samples of this pixel alone and print their values; nothing is written
     #[arg(long, value_name = "X,Y", value_parser = parse_list::<u32, 2>, requires = "sample", hide = true)]
     pub pixel: Option<[u32; 2]>,
     /// The sample to replay, counted from 0
     #[arg(long, value_name = "I", requires = "pixel", hide = true)]
     pub sample: Option<u32>,
-    #[command(flatten)]
-    pub exr: ExrArgs,
     /// A picture to be made again.
     #[arg(skip)]
     pub repeat: Option<Box<Repeat>>,
@@ -369,7 +376,7 @@ pub struct Verbosity {
 pub struct InfoArgs {
     /// The scene file: .json, .xml (Mitsuba 3), .pbrt (pbrt-v4), .gltf or .glb
     pub scene: PathBuf,
-    /// As JSON
+    /// Print JSON
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]
@@ -401,7 +408,7 @@ pub struct CompareArgs {
     pub reference: PathBuf,
     /// The picture to judge, an EXR file of the same size
     pub test: PathBuf,
-    /// As JSON
+    /// Print JSON
     #[arg(long)]
     pub json: bool,
 }
@@ -416,7 +423,7 @@ impl Command {
             Self::Merge(arguments) => only(arguments.quiet),
             Self::Rerender(arguments) => only(arguments.quiet),
             Self::Denoise(arguments) => only(arguments.quiet),
-            Self::Convert(arguments) => Verbosity { quiet: arguments.quiet, verbose: arguments.verbose },
+            Self::Convert(arguments) => arguments.verbosity,
             _ => Verbosity::default(),
         }
     }
@@ -443,57 +450,33 @@ impl RenderArgs {
             accel: self.accel,
             sampler: self.sampler,
             no_depth_of_field: self.no_depth_of_field,
-            transparent: self.transparent,
+            transparent: switch(self.transparent, self.no_transparent),
             max_depth: self.max_depth,
             strategy: self.strategy,
             roulette: self.roulette,
             clamp: self.clamp,
             regularize: self.regularize,
             caustics: self.caustics,
-            guiding: if self.no_guiding { Some(false) } else { self.guiding },
+            guiding: switch(self.guiding, self.no_guiding),
             guide: None,
             time_limit: self.time_limit,
             outputs: self.output.clone(),
             default_outputs,
             layers: self.layers.iter().flat_map(|layers| layers.list()).collect(),
-            float: self.float,
-            exr: self.exr.overrides(self.sequence.frames.is_some().then_some(self.sequence.fps)),
+            float: switch(self.float, self.no_float),
+            exr: ExrOverrides {
+                frames_per_second: self.sequence.frames.is_some().then_some(self.sequence.fps),
+                ..ExrChanges::merged(&self.exr)
+            },
             exposure: self.exposure,
             view: self.view,
         }
     }
 }
 
-fn parse_switch(text: &str) -> Result<bool, String> {
-    match text.trim() {
-        "on" => Ok(true),
-        "off" => Ok(false),
-        _ => Err("expected on or off".to_owned()),
-    }
-}
-
-fn parse_size(text: &str) -> Result<[u32; 2], String> {
-    let parse = || {
-        let (width, height) = text.split_once(['x', 'X'])?;
-        Some([width.trim().parse().ok()?, height.trim().parse().ok()?])
-    };
-    parse().ok_or_else(|| "expected WIDTHxHEIGHT, such as 1920x1080".to_owned())
-}
-
-fn parse_list<T: std::str::FromStr, const N: usize>(text: &str) -> Result<[T; N], String> {
-    let numbers: Option<Vec<T>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
-    numbers
-        .and_then(|numbers| numbers.try_into().ok())
-        .ok_or_else(|| format!("expected {N} whole numbers, separated by commas"))
-}
-
-fn accel_help() -> String {
-    let line = |(name, what): &(&str, &str)| format!("  {name:<16}{what}");
-    let lines: Vec<_> = AccelKind::CHOICES.iter().map(line).collect();
-    format!(
-        "Ray accelerator; all give the same picture within rounding. Options combine, as in embree:low+compact\n\n{}",
-        lines.join("\n")
-    )
+/// What a switch and its opposite set: nothing if neither was given.
+fn switch(on: bool, off: bool) -> Option<bool> {
+    (on || off).then_some(on)
 }
 
 #[cfg(test)]

@@ -22,7 +22,7 @@ pub struct StateArgs {
     ///
     /// It is replaced as a whole, so a render killed at any moment loses at most the samples of the last interval.
     /// SIGUSR1 writes it at once; Ctrl-C and SIGTERM write it before the picture. It stays when the picture is done:
-    /// --resume with a larger --spp adds the missing samples (not with --guiding on, where they depend on how many
+    /// --resume with a larger --spp adds the missing samples (not with --guiding, where they depend on how many
     /// there are).
     #[arg(long, value_name = "FILE", help_heading = "State")]
     pub checkpoint: Option<PathBuf>,
@@ -34,14 +34,15 @@ pub struct StateArgs {
         )
     ]
     pub every: Duration,
-    /// Continue from the checkpoint if there is one; the picture is the same bit for bit as without the interruption
+    /// Continue an interrupted run: from the checkpoint, if there is one; the picture is the same bit for bit as
+    /// without the interruption
     #[arg(long, requires = "checkpoint", help_heading = "State")]
     pub resume: bool,
     /// Render only part I of N of the samples of every pixel, counted from 1, into a file for `steradian merge`
     ///
     /// -o names the file, which ends with .shard; without it, that is SCENE.I-of-N.shard. All parts are to have the
     /// same options; merged, they are the same picture bit for bit as in one run. Not with --target-error or
-    /// --guiding on, but with --guide.
+    /// --guiding, but with --guide.
     #[arg(long, value_name = "I/N", help_heading = "State")]
     pub shard: Option<Shard>,
 }

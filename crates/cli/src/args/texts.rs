@@ -33,10 +33,12 @@ Examples:
       An eighth of the samples into cornell.2-of-8.shard, for steradian merge.
   steradian render cornell.json --set film.filter.type=box --set integrator.rr_depth=8
       Any key of the scene's film, sampler and integrator.
-  steradian render cornell.json -q --json - | jq .mrays_per_second
+  steradian render cornell.json -q --stats - | jq .mrays_per_second
       Statistics for scripts.
 
-Without -o and without \"outputs\" in the scene, SCENE.exr and SCENE.png are written to the working directory.
+Switches that a scene or a configuration file may set have an opposite, such as --no-denoise or --depth-of-field; the \
+last one
+counts. Without -o and without \"outputs\" in the scene, SCENE.exr and SCENE.png are written to the working directory.
 Ctrl-C finishes the samples under way and writes the picture; a second one leaves at once.";
 
 pub const RENDER_SHORT_EXAMPLES: &str = "\

@@ -19,11 +19,12 @@ pub fn read(options: &Options, file: &Path, trust: Trust, user: u32) -> Result<R
 }
 
 fn settings(options: &Options, file: &Path, entries: Vec<Entry>) -> Result<Vec<Setting>> {
-    let setting = |Entry { key, words, line }| {
-        let setting = options.setting(&key, words, Origin::File(file.to_owned(), line));
-        setting.map_err(|message| Error::Usage(format!("{}:{line}: {message}", file.display())))
-    };
-    entries.into_iter().map(setting).collect()
+    let mut settings = Vec::new();
+    for Entry { key, words, line } in entries {
+        let found = options.settings(&key, words, Origin::File(file.to_owned(), line));
+        settings.extend(found.map_err(|message| Error::Usage(format!("{}:{line}: {message}", file.display())))?);
+    }
+    Ok(settings)
 }
 
 #[cfg(test)]
@@ -45,7 +46,8 @@ mod tests {
     fn keys_are_options_and_values_what_they_take() {
         let found = parsed(
             "# project\nspp = 64\ntarget_error = 1e-3\nsize = \"64x32\"\ncrop = [1, 2, 3, 4]\n\
-             output = [\"a.exr\", \"b.png\"]\nguiding = true\nfloat = true\n",
+             output = [\"a.exr\", \"b.png\"]\nguiding = true\nfloat = true\n\
+             [exr]\nprofile = \"nuke\"\ncrypto_depth = 4\n",
         );
         let found: Vec<_> =
             found.unwrap().into_iter().map(|s| format!("{}={} {}", s.key, s.values.join(";"), s.origin)).collect();
@@ -55,8 +57,10 @@ mod tests {
             "size=64x32 s.toml:4",
             "crop=1,2,3,4 s.toml:5",
             "output=a.exr;b.png s.toml:6",
-            "guiding=on s.toml:7",
+            "guiding=true s.toml:7",
             "float=true s.toml:8",
+            "exr.crypto_depth=4 s.toml:9",
+            "exr.profile=nuke s.toml:9",
         ];
         assert_eq!(found, expected);
     }
@@ -67,10 +71,11 @@ mod tests {
         for arg in options.render.iter().chain(&options.global) {
             let key = arg.get_long().unwrap();
             let value = match (key, arg.get_action()) {
-                ("guiding", _) | (_, clap::ArgAction::SetTrue) => "true".to_owned(),
+                (_, clap::ArgAction::SetTrue) => "true".to_owned(),
                 ("accel", _) => "\"bvh\"".to_owned(),
                 ("layers", _) => "[\"Z\"]".to_owned(),
                 ("define", _) => "[\"a=1\"]".to_owned(),
+                ("exr", _) => "\"owner=a\"".to_owned(),
                 ("size", _) => "\"8x8\"".to_owned(),
                 ("crop", _) => "[0, 0, 1, 1]".to_owned(),
                 ("tev", _) => "\"localhost:1\"".to_owned(),
@@ -112,6 +117,7 @@ mod tests {
             ("spp = 1\nspp = 2", "s.toml:2: "),
             ("spp =", "s.toml:1: "),
             ("float = 3", "s.toml:1: float is true or false"),
+            ("spp = 1\nexr = { profil = 3 }", "s.toml:2: invalid value 'profil=3' for '--exr"),
             ("[render]\nspp = 2", "s.toml:1: "),
             ("frames = \"1-2\"", "s.toml:1: \"frames\" belongs to the command line"),
         ] {
@@ -125,7 +131,7 @@ mod tests {
     #[test]
     fn damaged_files_are_read_or_refused() {
         const TEXT: &str = "# a\nspp = 64\nlayers = [\"Z\", \"N\"]\nsize = \"8x8\"\nexposure = -1.5e1\nfloat = true\n\
-                            seed = 0x10\ncomments = 1979-05-27\n";
+                            seed = 0x10\nexr = 1979-05-27\n";
         let options = Options::new(&Cli::command());
         let check = |text: &str| {
             if let Err(error) = parse(&options, Trust::Project, text) {

@@ -1,5 +1,6 @@
 //! Hints for command lines of other programs, and of those who forget a word.
 
+use std::ffi::OsString;
 use std::path::Path;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -35,8 +36,26 @@ const OPTIONS: [(&str, &str); 27] = [
     ("--spectral", "unsupported: Steradian renders in linear RGB"),
 ];
 
+/// Options of earlier versions: the command, the option, and what replaces it.
+const RENAMED: [(&str, &str, &str); 14] = [
+    ("render", "--exr-profile", "--exr profile=NAME"),
+    ("render", "--compression", "--exr compression=NAME"),
+    ("render", "--dwa-level", "--exr dwa_level=LEVEL"),
+    ("render", "--uncropped", "--exr uncropped=true"),
+    ("render", "--crypto-depth", "--exr crypto_depth=N"),
+    ("render", "--crypto-manifest", "--exr crypto_manifest=PLACE"),
+    ("render", "--owner", "--exr owner=TEXT"),
+    ("render", "--comments", "--exr comments=TEXT"),
+    ("render", "on", "--guiding, without a value"),
+    ("render", "off", "--no-guiding, without a value"),
+    ("error", "on", "--guiding, without a value"),
+    ("error", "off", "--no-guiding, without a value"),
+    ("slurm", "--time", "--walltime TIME"),
+    ("check-exr", "--strict", "--fail-on-warning"),
+];
+
 /// What a faulty command line may have been meant to be.
-pub fn hint(error: &clap::Error) -> Option<String> {
+pub fn hint(error: &clap::Error, line: &[OsString]) -> Option<String> {
     let given = |kind: ContextKind| match error.get(kind)? {
         ContextValue::String(text) => Some(text.as_str()),
         _ => None,
@@ -54,7 +73,12 @@ pub fn hint(error: &clap::Error) -> Option<String> {
         }
         ErrorKind::UnknownArgument => {
             let option = given(ContextKind::InvalidArg)?;
-            let (_, here) = OPTIONS.iter().find(|(other, _)| *other == option)?;
+            let renamed = || {
+                let mut renamed = RENAMED.iter().filter(|(command, ..)| line.iter().any(|word| word == command));
+                renamed.find(|(_, old, _)| *old == option).map(|(.., new)| new)
+            };
+            let other = || OPTIONS.iter().find(|(other, _)| *other == option).map(|(_, here)| here);
+            let here = renamed().or_else(other)?;
             Some(format!("In place of {option}: {here}"))
         }
         _ => None,
@@ -66,8 +90,9 @@ mod tests {
     use super::*;
 
     fn hint_for(line: &str) -> Option<String> {
-        let line = ["steradian"].into_iter().chain(line.split_whitespace());
-        hint(&crate::args::command_line().try_get_matches_from(line).unwrap_err())
+        let line: Vec<OsString> =
+            ["steradian"].into_iter().chain(line.split_whitespace()).map(OsString::from).collect();
+        hint(&crate::args::command_line().try_get_matches_from(&line).unwrap_err(), &line)
     }
 
     #[test]
@@ -88,5 +113,18 @@ mod tests {
             }
         }
         assert_eq!(hint_for("render a.json --nonsense"), None);
+    }
+
+    #[test]
+    fn renamed_options_lead_to_their_new_names() {
+        for (command, old, new) in RENAMED {
+            let line = match command {
+                "error" => format!("bench error a.json --guiding {old}"),
+                "slurm" => format!("farm slurm a.json --shards 2 {old} 1:00"),
+                _ => format!("{command} a.json {old}"),
+            };
+            assert_eq!(hint_for(&line).unwrap(), format!("In place of {old}: {new}"));
+        }
+        assert_eq!(hint_for("info a.json --compression"), None);
     }
 }

@@ -8,16 +8,20 @@ mod show;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
+use clap::error::ErrorKind;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
 use steradian::internal::config::{PREFIX, Trust, Words, trust};
-use steradian::internal::farm::message_lines;
+use steradian::internal::farm::{is_scene_per_frame, message_lines};
 use steradian::internal::suggestion::did_you_mean;
-use steradian::{Error, Result};
+use steradian::{Error, ExrChanges, Result};
 
-use crate::args::{Cli, FIRST_STEPS, command_line};
-use crate::log;
+use crate::args::{self, Cli, FIRST_STEPS, command_line, opposite};
+use crate::log::{self, Level};
 pub use show::run as show;
+
+/// What the names of settings begin with that are keys of `exr`.
+pub const EXR_KEYS: &str = "exr.";
 
 /// Variables in which farms store how many processors a task may use.
 const FARM_THREADS: [&str; 2] = ["SLURM_CPUS_PER_TASK", "CUE_THREADS"];
@@ -74,29 +78,57 @@ pub fn parse() -> Result<Parsed> {
         std::process::exit(2);
     }
     let command = color(command_line(), &line);
-    let matches = command.clone().try_get_matches_from(&line).unwrap_or_else(|error| exit(&error));
+    let matches = command.clone().try_get_matches_from(&line).unwrap_or_else(|error| {
+        if let Some(scene) = missing_scene(&command, &line, &error) {
+            log::message(Level::Error, &format!("{}: no such file", scene.display()));
+        }
+        exit(&error, &line)
+    });
     let Some(("render", render)) = matches.subcommand() else {
-        return Ok(Parsed { cli: typed(&matches), warnings: Vec::new(), added: Vec::new(), files: Vec::new() });
+        return Ok(Parsed { cli: typed(&matches, &line), warnings: Vec::new(), added: Vec::new(), files: Vec::new() });
     };
     let scene = render.get_one::<PathBuf>("scene").cloned().unwrap_or_default();
     let options = Options::new(&command);
     let Found { settings, files, warnings } = settings(&options, &scene)?;
-    let given = |key: &str| options.find(key).is_some_and(|arg| is_given(render, &matches, arg));
+    let given = |key: &str| [key, &opposite(key)].iter().any(|name| is_given(render, &matches, name));
     // --verbose on the command line overrides `quiet` in a file.
     let opposed = |key: &str| (key == "quiet" && given("verbose")) || (key == "verbose" && given("quiet"));
     let added: Vec<Setting> =
         settings.into_iter().filter(|setting| !given(&setting.key) && !opposed(&setting.key)).collect();
-    let command = added
-        .iter()
-        .filter(|setting| !setting.values.is_empty())
-        .fold(command, |command, setting| options.with_default(command, setting));
-    let matches = command.try_get_matches_from(&line).unwrap_or_else(|error| exit(&error));
-    Ok(Parsed { cli: typed(&matches), warnings, added, files })
+    let command = added.iter().fold(command, |command, setting| options.with_default(command, setting));
+    let matches = command.try_get_matches_from(&line).unwrap_or_else(|error| exit(&error, &line));
+    let mut cli = typed(&matches, &line);
+    if let args::Command::Render(arguments) = &mut cli.command {
+        // Those of the command line come later and count.
+        for setting in &added {
+            let Some(key) = setting.key.strip_prefix(EXR_KEYS) else { continue };
+            let change: Result<ExrChanges, String> = format!("{key}={}", setting.values.join(",")).parse();
+            arguments.exr.insert(0, change.map_err(|message| Error::Usage(format!("{}: {message}", setting.origin)))?);
+        }
+    }
+    Ok(Parsed { cli, warnings, added, files })
+}
+
+/// The scene, if it does not exist, of a command line with a faulty value: both are to be reported.
+fn missing_scene(command: &Command, line: &[OsString], error: &clap::Error) -> Option<PathBuf> {
+    if ![ErrorKind::InvalidValue, ErrorKind::ValueValidation].contains(&error.kind()) {
+        return None;
+    }
+    let any_value = |arg: Arg| {
+        let takes_path = arg.get_id() == "scene" || !arg.get_action().takes_values();
+        if takes_path { arg } else { arg.value_parser(clap::value_parser!(OsString)) }
+    };
+    let lenient = ["render", "info"]
+        .into_iter()
+        .fold(command.clone(), |command, name| command.mut_subcommand(name, |command| command.mut_args(any_value)));
+    let matches = lenient.try_get_matches_from(line).ok()?;
+    let scene = matches.subcommand()?.1.try_get_one::<PathBuf>("scene").ok()??;
+    (!scene.exists() && !is_scene_per_frame(scene)).then(|| scene.clone())
 }
 
 /// Ends the program with what is wrong with the command line, or with help. Words of the line steer neither terminals
 /// nor farms.
-fn exit(error: &clap::Error) -> ! {
+fn exit(error: &clap::Error, line: &[OsString]) -> ! {
     let text = error.to_string();
     let harmless = message_lines(&text);
     if !error.use_stderr() {
@@ -108,7 +140,7 @@ fn exit(error: &clap::Error) -> ! {
     } else {
         log::line(harmless.trim_end());
     }
-    if let Some(hint) = hints::hint(error) {
+    if let Some(hint) = hints::hint(error, line) {
         log::line(&message_lines(&format!("\n{hint}")));
     }
     std::process::exit(error.exit_code());
@@ -133,8 +165,8 @@ fn check_utf8(line: &[OsString]) -> Result<()> {
     }
 }
 
-fn typed(matches: &ArgMatches) -> Cli {
-    Cli::from_arg_matches(matches).unwrap_or_else(|error| exit(&error))
+fn typed(matches: &ArgMatches, line: &[OsString]) -> Cli {
+    Cli::from_arg_matches(matches).unwrap_or_else(|error| exit(&error, line))
 }
 
 /// Help and complaints about the command line follow `--color`, which is not parsed yet.
@@ -149,10 +181,9 @@ fn color(command: Command, line: &[OsString]) -> Command {
     })
 }
 
-fn is_given(render: &ArgMatches, root: &ArgMatches, arg: &Arg) -> bool {
-    let source = |matches: &ArgMatches| {
-        matches.try_contains_id(arg.get_id().as_str()).ok().and_then(|_| matches.value_source(arg.get_id().as_str()))
-    };
+fn is_given(render: &ArgMatches, root: &ArgMatches, name: &str) -> bool {
+    let id = name.replace('-', "_");
+    let source = |matches: &ArgMatches| matches.try_contains_id(&id).ok().and_then(|_| matches.value_source(&id));
     [render, root].into_iter().any(|matches| source(matches) == Some(ValueSource::CommandLine))
 }
 
@@ -197,11 +228,12 @@ impl Options {
         format!("\"{key}\" {why}{hint}")
     }
 
-    /// The command with a setting's values as the option's default.
+    /// The command with a setting's values as the option's default; of a switch that is off, its opposite is on.
     fn with_default(&self, command: Command, setting: &Setting) -> Command {
         let Some(arg) = self.find(&setting.key) else { return command };
-        let id = arg.get_id().as_str().to_owned();
-        let values: Vec<String> = setting.values.clone();
+        let is_off = setting.values.is_empty();
+        let id = if is_off { opposite(&setting.key).replace('-', "_") } else { arg.get_id().as_str().to_owned() };
+        let values = if is_off { vec!["true".to_owned()] } else { setting.values.clone() };
         let set = move |arg: Arg| arg.default_values(values);
         if self.global.iter().any(|global| global.get_id() == arg.get_id()) {
             command.mut_arg(id, set)
@@ -210,8 +242,9 @@ impl Options {
         }
     }
 
-    /// A setting of which the words are those of a variable or a file; `Err` is the message.
-    fn setting(&self, key: &str, words: Words, origin: Origin) -> Result<Setting, String> {
+    /// The setting of which the words are those of a variable or a file, one for each key of `exr`; `Err` is the
+    /// message.
+    fn settings(&self, key: &str, words: Words, origin: Origin) -> Result<Vec<Setting>, String> {
         let key = key.replace('_', "-");
         let arg = self.find(&key).ok_or_else(|| self.unknown(&key))?;
         let values = values_of(words, arg)?;
@@ -232,7 +265,18 @@ impl Options {
                 _ => {}
             }
         }
-        Ok(Setting { key, values, origin })
+        if key != "exr" {
+            return Ok(vec![Setting { key, values, origin }]);
+        }
+        let mut settings = Vec::new();
+        for changes in values {
+            settings.extend(changes.parse::<ExrChanges>()?.pairs().map(|(key, value)| Setting {
+                key: format!("{EXR_KEYS}{key}"),
+                values: vec![value.to_owned()],
+                origin: origin.clone(),
+            }));
+        }
+        Ok(settings)
     }
 }
 
@@ -310,11 +354,11 @@ fn environment(
         let words = match (arg.get_action(), value.to_lowercase().as_str()) {
             (ArgAction::SetTrue, "1" | "true" | "yes" | "on") => Words::Switch(true),
             (ArgAction::SetTrue, "0" | "false" | "no" | "off") => Words::Switch(false),
-            (ArgAction::Append, _) => Words::Many(value.split(',').map(str::to_owned).collect()),
+            (ArgAction::Append, _) if key != "exr" => Words::Many(value.split(',').map(str::to_owned).collect()),
             _ => Words::One(value.to_owned()),
         };
-        let setting = options.setting(&key, words, Origin::Environment(name.to_owned()));
-        found.push(setting.map_err(|message| Error::Usage(format!("{name}: {message}")))?);
+        let settings = options.settings(&key, words, Origin::Environment(name.to_owned()));
+        found.extend(settings.map_err(|message| Error::Usage(format!("{name}: {message}")))?);
     }
     Ok(found)
 }
@@ -337,6 +381,7 @@ mod tests {
             ("STERADIAN_FLOAT", "yes"),
             ("STERADIAN_OVERWRITE", "0"),
             ("STERADIAN_OUTPUT", "a.exr,b.png"),
+            ("STERADIAN_EXR", "profile=nuke,comments=a, b"),
             ("STERADIAN_SEED", ""),
             ("HOME", "/"),
         ]);
@@ -346,6 +391,8 @@ mod tests {
             ("float", vec!["true"]),
             ("overwrite", vec![]),
             ("output", vec!["a.exr", "b.png"]),
+            ("exr.profile", vec!["nuke"]),
+            ("exr.comments", vec!["a, b"]),
         ];
         assert_eq!(
             found,
@@ -372,7 +419,9 @@ mod tests {
         let mut command = Cli::command();
         command.build();
         let render = command.find_subcommand("render").unwrap();
-        let mut options: Vec<&str> = render.get_arguments().filter_map(Arg::get_long).collect();
+        let is_opposite = |name: &&str| name.strip_prefix("no-").is_some_and(|name| trust(name).is_some());
+        let mut options: Vec<&str> =
+            render.get_arguments().filter_map(Arg::get_long).filter(|name| !is_opposite(name)).collect();
         let mut classified: Vec<&str> =
             steradian::internal::config::options().filter(|name| *name != "version").collect();
         options.sort_unstable();

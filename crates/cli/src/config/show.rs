@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use steradian::internal::import::{self, ImportOptions};
 use steradian::{Error, Result};
 
-use super::{Options, settings};
+use super::{EXR_KEYS, Options, settings};
 use crate::args::{Cli, ConfigShowArgs};
 use crate::log::{self, Level};
 use crate::text;
@@ -44,7 +44,8 @@ pub fn run(arguments: &ConfigShowArgs) -> Result<()> {
     found.warnings.iter().for_each(|warning| log::message(Level::Warning, warning));
     let of_scene = scene_rows(arguments.scene.as_deref())?;
     let mut rows: Vec<SettingRow> = Vec::new();
-    for name in options.names() {
+    let keys = found.settings.iter().map(|setting| setting.key.as_str()).filter(|key| key.starts_with(EXR_KEYS));
+    for name in options.names().chain(keys) {
         let setting = found.settings.iter().find(|setting| setting.key == name).map(|setting| {
             let value = if setting.values.is_empty() { "false".to_owned() } else { setting.values.join(",") };
             SettingRow { key: name.to_owned(), value, origin: setting.origin.to_string() }

@@ -81,7 +81,7 @@ fn name(argument: &Arg) -> String {
 }
 
 fn meaning(argument: &Arg) -> String {
-    let mut meaning = escaped(&text(argument.get_long_help().or(argument.get_help())));
+    let mut meaning = in_cell(&text(argument.get_long_help().or(argument.get_help())));
     let values: Vec<String> = argument
         .get_possible_values()
         .iter()
@@ -93,14 +93,41 @@ fn meaning(argument: &Arg) -> String {
         .collect();
     let is_switch = !argument.get_num_args().is_some_and(|number| number.takes_values());
     if !values.is_empty() && !is_switch {
-        let _ = write!(meaning, " Values: {}.", values.join("; "));
+        let end = if meaning.ends_with('.') { "" } else { "." };
+        let _ = write!(meaning, "{end} Values: {}.", values.join("; "));
     }
     if let [default] = argument.get_default_values()
         && !is_switch
     {
-        let _ = write!(meaning, " Default: `{}`.", default.to_string_lossy());
+        let end = if meaning.ends_with('.') { "" } else { "." };
+        let _ = write!(meaning, "{end} Default: `{}`.", default.to_string_lossy());
     }
     meaning
+}
+
+/// Help as the cell of a table: paragraphs follow one another, and lists, whose lines are indented, have lines.
+fn in_cell(help: &str) -> String {
+    let mut cell = String::new();
+    for line in help.lines().filter(|line| !line.trim().is_empty()) {
+        let (name, about) = line.trim().split_once(' ').unwrap_or((line.trim(), ""));
+        let about = escaped(about.trim());
+        if line.starts_with("    ") {
+            let _ = write!(cell, "<br>&emsp;`{name}`: {about}");
+        } else if line.starts_with("  ") {
+            let _ = write!(cell, "<br>`{name}`: {about}");
+        } else {
+            let ends = cell.is_empty() || cell.ends_with(['.', ':', '?', '!']);
+            cell.push_str(if cell.is_empty() {
+                ""
+            } else if ends {
+                " "
+            } else {
+                ". "
+            });
+            cell.push_str(&escaped(line.trim()));
+        }
+    }
+    cell
 }
 
 fn text(styled: Option<&StyledStr>) -> String {

@@ -12,6 +12,7 @@ use crate::desc::{
 };
 use crate::error::Result;
 use crate::import::foreign::Draft;
+use crate::import::foreign::recolor::linear_pixels;
 use crate::math::{DAffine3, DMat3, DVec3};
 
 /// Reads a `LightSource`. pbrt divides each light by what its spectrum measures in nits, and the film takes a nit as 1.
@@ -96,8 +97,10 @@ impl Lights<'_> {
             return Ok(LightDesc::Point(PointLightDesc { position, intensity, group: None }));
         };
         let asset = self.colors.folder.join(file);
-        let image = read_rgb_image(&asset)
+        let image = read_image(&asset)
             .map_err(|error| error.at(self.scene, &format!("{}: {}", params.place, params.element), &asset))?;
+        let pixels = linear_pixels(&image, true).collect();
+        let image = RgbImage { width: image.width, height: image.height, pixels };
         if image.width != image.height {
             return Err(params.error("the image of a goniometric light must be square: an equal-area map"));
         }
