@@ -14,7 +14,7 @@
 //! | # | modules |
 //! |---|---|
 //! | 0 | `id`, `error`, `memory`, `metal`, `printable`, `suggestion`, `bytes` |
-//! | 1 | `math`, `desc`, `file`, `attribute`, `image_data` |
+//! | 1 | `math`, `desc`, `file`, `attribute`, `image_data`, `spectrum` |
 //! | 2 | `color`, `sampling`, `config`, `subdivision` |
 //! | 3 | `assets`, `geometry`, `texture`, `bsdf`, `camera`, `film`, `guiding` |
 //! | 4 | `accel`, `material`, `medium`, `opacity`, `normal_perturbation`, `light`, `output` |
@@ -60,6 +60,7 @@ mod render;
 mod renderer;
 mod sampling;
 mod scene;
+mod spectrum;
 mod subdivision;
 mod suggestion;
 mod texture;

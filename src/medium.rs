@@ -5,12 +5,14 @@
 //! the way that light took to it: a boundary is where what is there changes, and light finds the same boundaries in
 //! either direction.
 
+mod blackbody;
 mod blocks;
 mod noise;
 mod subsurface;
 mod volume;
 mod voxels;
 
+pub use blackbody::blackbody;
 pub use noise::Noise;
 pub use subsurface::{Subsurface, half_space_albedo};
 pub use volume::{Coefficients, ExtinctionSplit, FreeFlight, Tracked, Volume, VolumeGrids};

@@ -2,14 +2,12 @@
 
 use serde_json::{Value, json};
 use steradian::ErrorKind;
-use steradian::internal::accel::AccelKind;
 use steradian::internal::assets::{VolumeData, vol_bytes};
-use steradian::internal::render::Overrides;
 
 use crate::bad_input::assert_error;
-use crate::participating_media::{self, assert_means, foggy, hg, integral};
+use crate::participating_media::{self, assert_means, foggy, hg, integral, runs};
 use crate::util::folder::{Folder, good_scene, set};
-use crate::util::render::{Estimate, assert_blocks_agree, block_means, merge, prepare, probe, render, render_with};
+use crate::util::render::{Estimate, assert_blocks_agree, merge, probe, render};
 
 /// A ball of a medium whose box is around it.
 fn ball(medium: &Value) -> Value {
@@ -137,14 +135,57 @@ fn what_a_cloud_emits_is_the_quadrature() {
     }
 }
 
-fn runs(scene: &Value) -> Vec<Vec<f64>> {
-    let run = |seed: u64| {
-        let mut scene = scene.clone();
-        scene["sampler"]["seed"] = json!(seed);
-        let prepared = prepare(&scene, &Overrides { threads: Some(2), ..Overrides::default() });
-        block_means(&render_with(&prepared, AccelKind::EMBREE).image)
+/// What black bodies radiate by Planck's law, through the approximation of the CIE 1931 observer by Wyman, Sloan and
+/// Shirley ("Simple Analytic Approximations to the CIE XYZ Color Matching Functions"), scaled as Blender's: linear
+/// Rec.709 of luminance 1 times Stefan and Boltzmann's power.
+fn blackbody(kelvin: f64) -> [f64; 3] {
+    let lobe = |x: f64, middle: f64, [below, above]: [f64; 2]| {
+        let t = (x - middle) * if x < middle { below } else { above };
+        (-0.5 * t * t).exp()
     };
-    (0..8).map(run).collect()
+    let mut xyz = [0.0; 3];
+    for nanometres in 360..=830 {
+        let x = f64::from(nanometres);
+        let radiance = x.powi(-5) / (1.438_776_877e7 / (x * kelvin)).exp_m1();
+        xyz[0] += radiance
+            * (1.056 * lobe(x, 599.8, [0.0264, 0.0323]) + 0.362 * lobe(x, 442.0, [0.0624, 0.0374])
+                - 0.065 * lobe(x, 501.1, [0.0490, 0.0382]));
+        xyz[1] += radiance * (0.821 * lobe(x, 568.8, [0.0213, 0.0247]) + 0.286 * lobe(x, 530.9, [0.0613, 0.0322]));
+        xyz[2] += radiance * (1.217 * lobe(x, 437.0, [0.0845, 0.0278]) + 0.681 * lobe(x, 459.0, [0.0385, 0.0725]));
+    }
+    let [x, y, z] = xyz.map(|c| c / xyz[1] * 5.670_374_419e-14 * kelvin.powi(4) / std::f64::consts::PI);
+    [
+        3.240_48 * x - 1.537_15 * y - 0.498_54 * z,
+        -0.969_26 * x + 1.876 * y + 0.041_56 * z,
+        0.055_65 * x - 0.204_04 * y + 1.057_31 * z,
+    ]
+}
+
+#[test]
+fn what_fire_emits_is_plancks() {
+    // From 1,000 to 4,000 K along z.
+    let kelvin = [1.0, 2.5, 4.0];
+    let mut scene = slab(json!({ "emission": [0.5, 2, 1] }), "clamp");
+    scene["lights"] = json!([]);
+    let volume = &mut scene["media"]["m"]["volume"];
+    volume["temperature"] = json!({ "type": "grid", "resolution": [1, 1, 3], "values": kelvin });
+    volume["temperature_scale"] = json!(1000);
+    let image = render(&scene);
+    let expected = |channel: usize| {
+        THICKNESS
+            * [0.5, 2.0, 1.0][channel]
+            * integral(|x| {
+                interpolated(&DENSITY, x, false)
+                    * interpolated(&EMISSION, x, false)
+                    * blackbody(1000.0 * interpolated(&kelvin, x, false))[channel]
+            })
+    };
+    for channel in 0..3 {
+        let (found, expected) = (Estimate::of(&image, channel), expected(channel));
+        // The approximation of the observer is within 1 %.
+        let bound = 5.5 * found.error + 0.015 * expected;
+        assert!((found.mean - expected).abs() < bound, "{channel}: {found:?} {expected}");
+    }
 }
 
 #[test]
@@ -320,6 +361,8 @@ fn volumes_that_make_no_sense() {
     let bright = json!({ "albedo": grid(json!([1, 1, 1]), json!([1.5])) });
     let phases = json!({ "type": "mix", "phases": [{ "type": "rayleigh" }], "weights": [1, 2] });
     let negative = json!({ "type": "mix", "phases": [{ "type": "rayleigh" }], "weights": [-1] });
+    let hot = json!({ "emission": 1, "volume": {
+        "temperature": grid(json!([1, 1, 1]), json!([60_000])), "temperature_scale": 2 } });
     let lobe = json!({ "type": "rayleigh" });
     let many = json!({ "type": "mix", "phases": [lobe, lobe, lobe, lobe, lobe], "weights": [1, 1, 1, 1, 1] });
     let folder = Folder::new();
@@ -341,6 +384,15 @@ fn volumes_that_make_no_sense() {
         ),
         (at, json!({ "type": "noise", "frequency": [0, 1, 1] }), "media.fog.volume.density.frequency[0]", "0"),
         (at, json!({ "type": "noise", "octaves": 99 }), "media.fog.volume.density.octaves", "99"),
+        (
+            "media.fog.volume.temperature",
+            grid(json!([1, 1, 1]), json!([500])),
+            "media.fog.volume.temperature",
+            "emission",
+        ),
+        ("media.fog.volume.temperature_scale", json!(2), "media.fog.volume.temperature_scale", "not given"),
+        ("media.fog.volume.temperature_scale", json!(0), "media.fog.volume.temperature_scale", "above 0"),
+        ("media.fog", hot, "media.fog.volume.temperature", "from 0 to 5e4"),
         ("media.fog.volume", flat, "media.fog.volume.bounds", "flat"),
         ("media.fog.volume", squashed, "media.fog.volume.bounds", "flat"),
         ("media.fog.volume", both, "media.fog.volume.albedo", "together"),

@@ -64,11 +64,85 @@ fn a_white_furnace_shows_no_ball() {
 #[test]
 fn a_white_furnace_of_glass_around_a_medium_shows_no_ball() {
     // Light keeps its radiance over the squared index, in and out.
-    let mut scene = ball(&json!({ "scattering": [0.5, 1, 3], "phase": henyey_greenstein(0.4) }));
-    scene["materials"]["cloud"]["ior"] = json!(1.4);
-    assert_means(&render(&scene), [1.0; 3], "smooth glass");
-    scene["materials"]["cloud"]["roughness"] = json!(0.5);
-    assert_means(&render(&scene), [1.0; 3], "rough glass");
+    for strategy in ["mis", "light", "bsdf"] {
+        let mut scene = ball(&json!({ "scattering": [0.5, 1, 3], "phase": henyey_greenstein(0.4) }));
+        scene["integrator"]["strategy"] = json!(strategy);
+        scene["materials"]["cloud"]["ior"] = json!(1.4);
+        assert_means(&render(&scene), [1.0; 3], &format!("smooth glass, {strategy}"));
+        scene["materials"]["cloud"]["roughness"] = json!(0.5);
+        assert_means(&render(&scene), [1.0; 3], &format!("rough glass, {strategy}"));
+    }
+}
+
+/// The means of blocks, by seed.
+pub fn runs(scene: &Value) -> Vec<Vec<f64>> {
+    let run = |seed: u64| {
+        let mut scene = scene.clone();
+        scene["sampler"]["seed"] = json!(seed);
+        let prepared = prepare(&scene, &Overrides { threads: Some(2), ..Overrides::default() });
+        block_means(&render_with(&prepared, AccelKind::EMBREE).image)
+    };
+    (0..8).map(run).collect()
+}
+
+#[test]
+fn light_is_not_sampled_where_glass_encloses_a_medium() {
+    let body = |change: Value| {
+        let mut body = json!({ "type": "sphere", "material": "cloud" });
+        merge(&mut body, change);
+        body
+    };
+    let lamp = |x: f64| {
+        json!({
+            "type": "sphere", "radius": 0.01, "transform": { "translate": [x, 0, 0] }, "emission": { "radiance": 1 }
+        })
+    };
+    let shadow_rays = |shapes: Value, change: Value| {
+        let mut scene = ball(&json!({ "scattering": 3 }));
+        scene["materials"]["cloud"]["ior"] = json!(1.4);
+        scene["sampler"]["spp"] = json!(4);
+        scene["shapes"] = shapes;
+        merge(&mut scene, change);
+        let prepared = prepare(&scene, &Overrides { threads: Some(2), ..Overrides::default() });
+        render_with(&prepared, AccelKind::EMBREE).stats.rays.shadow
+    };
+    assert_eq!(shadow_rays(json!([body(json!({})), lamp(1.5)]), json!({})), 0);
+    let clear = json!({ "materials": { "clear": { "type": "dielectric", "ior": 1.4, "priority": 0 } } });
+    for (shapes, change, why) in [
+        (json!([body(json!({})), lamp(0.5)]), json!({}), "a lamp within"),
+        (json!([body(json!({})), lamp(1.5)]), json!({ "materials": { "cloud": { "ior": 1 } } }), "no refraction"),
+        (json!([body(json!({ "opacity": 0.5 })), lamp(1.5)]), json!({}), "holes"),
+        (json!([body(json!({})), lamp(1.5)]), json!({ "medium": "cloud" }), "the same medium all around"),
+        (
+            json!([body(json!({})), body(json!({ "material": "clear" })), lamp(1.5)]),
+            clear,
+            "another medium of the same index",
+        ),
+    ] {
+        assert!(shadow_rays(shapes, change) > 0, "{why}");
+    }
+}
+
+#[test]
+fn glass_around_a_medium_is_the_same_with_light_samples() {
+    // A lamp within that does not shine noticeably: light is sampled, and all shadow rays to the other lights end at
+    // the glass.
+    let scene = |radiance: Option<f64>| {
+        let mut scene = foggy(8);
+        let lamp = json!({
+            "type": "sphere", "radius": 0.01, "transform": { "translate": [-0.6, 0.5, 0] },
+            "emission": { "radiance": radiance.unwrap_or_default() }
+        });
+        let shapes = scene["shapes"].as_array_mut().unwrap();
+        shapes[1] = json!({
+            "type": "sphere", "material": "milk", "radius": 0.5, "transform": { "translate": [-0.6, 0.5, 0] }
+        });
+        shapes.extend(radiance.map(|_| lamp));
+        scene["materials"]["milk"]["roughness"] = json!(0.3);
+        scene["media"]["milk"]["emission"] = json!(0);
+        scene
+    };
+    assert_blocks_agree(&runs(&scene(None)), &runs(&scene(Some(1e-6))), "lamp within");
 }
 
 /// A slab between z = 0 and z = 1.5, seen along the axis before a white sky.
@@ -318,9 +392,16 @@ fn light_scattered_once_by_fog_is_in_its_layer() {
     for (pixel, part) in color.pixels().zip(volume.pixels()) {
         assert!(pixel[0] > 0.0 && pixel[..3] == part[..3]);
     }
-    // The camera sees a point of the fog in front of it.
+    // The camera sees a point of the fog in front of it, whose whole way is within 1e3.
     let depth = image.layer(LayerKind::Z).unwrap();
-    assert!(depth.data.iter().all(|&z| z > 0.0));
+    assert!(depth.data.iter().all(|&z| z > 0.0 && z < 1e3));
+    let coverage = image.coverage.as_ref().unwrap();
+    let prepared = prepare(&scene, &Overrides::default());
+    for pixel in 0..coverage.pixels() {
+        let [(key, 1.0)] = coverage.of(pixel) else { panic!("{:?}", coverage.of(pixel)) };
+        let identities = &prepared.scene.identities;
+        assert_eq!([identities.object(*key), identities.material(*key).into(), identities.asset(*key)], ["fog"; 3]);
+    }
     let alpha: Vec<f32> = color.pixels().map(|p| p[3]).collect();
     assert!(alpha.iter().all(|&a| a == 1.0));
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use super::mtl_maps::take_maps;
-use super::{AssetError, Assets, MeshData, ObjMap, RgbImage, VolumeData};
+use super::{AssetError, Assets, IesData, MeshData, ObjMap, RgbImage, VolumeData};
 use crate::image_data::{ImageData, Samples};
 
 /// Whether a file is an OBJ by its extension.
@@ -69,6 +69,10 @@ impl Assets {
         } else if let Some(VolumeData { resolution, channels, values }) = self.volumes.get(name) {
             hash.numbers(resolution.iter().chain([channels]).copied(), u32::to_le_bytes);
             hash.numbers(values.iter().copied(), f32::to_le_bytes);
+        } else if let Some(IesData { vertical, horizontal, candela }) = self.profiles.get(name) {
+            for numbers in [vertical, horizontal, candela] {
+                hash.numbers(numbers.iter().copied(), f32::to_le_bytes);
+            }
         } else {
             let RgbImage { width, height, pixels } = self.environments.get(name)?;
             hash.numbers([*width as u64, *height as u64], u64::to_le_bytes);

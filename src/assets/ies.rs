@@ -30,6 +30,22 @@ pub fn read_ies(path: &Path) -> Result<IesData, AssetError> {
     parse(&String::from_utf8_lossy(&bytes)).map_err(AssetError::Malformed)
 }
 
+/// The `.ies` file of a table.
+pub fn ies_bytes(data: &IesData) -> Vec<u8> {
+    let IesData { vertical, horizontal, candela } = data;
+    let counts = format!("{} {}", vertical.len(), horizontal.len());
+    let mut text = format!("IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 {counts} 1 2 0 0 0\n1 1 0\n");
+    for row in [vertical, horizontal].into_iter().map(Vec::as_slice).chain(candela.chunks(vertical.len().max(1))) {
+        // Lines of at most 256 letters, as the standard asks for.
+        for line in row.chunks(16) {
+            let numbers: Vec<String> = line.iter().map(|number| format!("{number:e}")).collect();
+            text.push_str(&numbers.join(" "));
+            text.push('\n');
+        }
+    }
+    text.into_bytes()
+}
+
 /// The numbers behind the TILT line, with their lines.
 struct Numbers<'a> {
     words: std::vec::IntoIter<(usize, &'a str)>,
@@ -173,6 +189,16 @@ mod tests {
         let data = parse(SMALL).unwrap();
         assert_eq!((data.vertical, data.horizontal), (vec![0.0, 45.0, 90.0], vec![0.0, 90.0]));
         assert_eq!(data.candela, [10.0, 8.0, 0.0, 10.0, 6.0, 0.0]);
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let candela: Vec<f32> = (0..60).map(|i| (i as f32).powi(7) * 1.234_567_9e-9).collect();
+        let vertical = (0..20).map(|i| i as f32 * 90.0 / 19.0).collect();
+        let data = IesData { vertical, horizontal: vec![0.0, 33.3, 90.0], candela };
+        let text = String::from_utf8(ies_bytes(&data)).unwrap();
+        assert_eq!(parse(&text), Ok(data));
+        assert!(text.lines().all(|line| line.len() <= 256));
     }
 
     #[test]

@@ -1,8 +1,8 @@
-//! Meshes, images and volumes that a reader made itself, for which there are no files.
+//! Meshes, images, volumes and profiles of lights that a reader made itself, for which there are no files.
 
 use std::collections::BTreeMap;
 
-use super::{MeshData, RgbImage, VolumeData};
+use super::{IesData, MeshData, RgbImage, VolumeData};
 use crate::image_data::ImageData;
 
 /// What a scene names as if it were a file: looked up here before the folder of the scene is.
@@ -16,6 +16,8 @@ pub struct Assets {
     pub environments: BTreeMap<String, RgbImage>,
     /// Volumes; such names end with `.vol`.
     pub volumes: BTreeMap<String, VolumeData>,
+    /// Intensities of lights by direction; such names end with `.ies`.
+    pub profiles: BTreeMap<String, IesData>,
 }
 
 impl Assets {
@@ -25,5 +27,6 @@ impl Assets {
             || self.images.contains_key(name)
             || self.environments.contains_key(name)
             || self.volumes.contains_key(name)
+            || self.profiles.contains_key(name)
     }
 }

@@ -19,7 +19,7 @@ mod volume;
 
 pub use environment_image::{RgbImage, read_rgb_image};
 pub(crate) use fingerprint::{Hash, file_hashes, files_of_obj, is_obj};
-pub use ies::{IesData, read_ies};
+pub use ies::{IesData, ies_bytes, read_ies};
 pub use image_file::{read_image, read_image_bytes};
 pub use in_memory::Assets;
 pub use mesh_data::MeshData;

@@ -99,6 +99,14 @@ impl IdentityTable {
         self.identities.add_shape(shape);
     }
 
+    /// Adds all media, by their names.
+    pub fn add_media(&mut self, names: &[Option<String>]) {
+        for name in names {
+            let name = name.as_deref().map(|name| self.name(name));
+            self.identities.add_medium(name);
+        }
+    }
+
     /// Adds the next instance of the geometry.
     pub fn add_instance(&mut self, placement: Option<PlacementId>) {
         self.identities.add_instance(placement);

@@ -203,7 +203,10 @@ fn ies(files: &CompileContext, path: &str, desc: &IesLightDesc, space: &RenderSp
     let intensity = files.intensity(&format!("{path}.intensity"), desc.intensity, space)?;
     let place = format!("{path}.file");
     let asset = files.source.asset(&desc.file);
-    let data = read_ies(&asset).map_err(|e| files.asset_error(&place, &asset, e))?;
+    let data = match files.source.assets.profiles.get(&desc.file) {
+        Some(profile) => profile.clone(),
+        None => read_ies(&asset).map_err(|e| files.asset_error(&place, &asset, e))?,
+    };
     let profile = IesProfile::new(data.vertical, data.horizontal, data.candela);
     let profile = profile
         .ok_or_else(|| files.asset_error(&place, &asset, AssetError::Malformed("no table of intensities".into())))?;

@@ -34,6 +34,8 @@ pub struct MaterialTable {
     pub normal_perturbations: Vec<NormalPerturbation>,
     /// What is within surfaces of these materials.
     pub media: Media,
+    /// What the scene calls them, if it does, by medium.
+    pub media_names: Vec<Option<String>>,
     /// Reliefs of materials of the scene file that have one.
     pub(super) by_material: HashMap<MaterialId, NormalPerturbationId>,
     names: HashMap<String, MaterialBinding>,
@@ -81,7 +83,9 @@ impl MaterialTable {
             }
         }
         let around = media.around(files, desc)?;
-        table.media = Media::new(table.medium_of.values().copied(), around).with_volumes(media.volumes);
+        let within = Media::new(table.medium_of.values().copied(), around);
+        table.media_names = within.iter().map(|medium| media.name_of(medium).map(str::to_owned)).collect();
+        table.media = within.with_volumes(media.volumes);
         table.textures = textures;
         Ok(table)
     }

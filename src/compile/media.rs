@@ -92,6 +92,12 @@ impl<'a> NamedMedia<'a> {
         self.media.get(name).copied().ok_or_else(|| files.unknown(path, "medium", name, self.media.keys().copied()))
     }
 
+    /// The name of a medium, whatever priority and index it has got from a material.
+    pub fn name_of(&self, medium: &Medium) -> Option<&'a str> {
+        let is_same = |named: &Medium| Medium { priority: medium.priority, ior: medium.ior, ..*named } == *medium;
+        self.media.iter().find(|(_, named)| is_same(named)).map(|(name, _)| *name)
+    }
+
     /// What is around everything.
     pub fn around(&self, files: &CompileContext, desc: &SceneDesc) -> Result<Option<Medium>> {
         let Some(name) = &desc.medium else { return Ok(None) };

@@ -247,6 +247,7 @@ impl Builder {
 
     fn finish(mut self, desc: &SceneDesc, camera: crate::camera::Camera) -> Result<Scene> {
         let files = &self.files;
+        self.identities.add_media(&self.materials.media_names);
         if !self.space.is_world() {
             self.materials.media.place(&self.space);
             for perturbation in &mut self.materials.normal_perturbations {

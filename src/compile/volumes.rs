@@ -10,6 +10,9 @@ use crate::math::{DAffine3, DMat3, DVec3};
 use crate::medium::{Border, ExtinctionSplit, Medium, Noise, Volume, VolumeGrids, VoxelGrid};
 use crate::memory::is_available;
 
+/// The largest temperature, in kelvin.
+const MAX_TEMPERATURE: f32 = 1e5;
+
 /// The most voxels of noise.
 const MAX_NOISE: u64 = 1 << 27;
 
@@ -41,8 +44,34 @@ pub(super) fn volume(files: &CompileContext, path: &str, desc: &MediumVolumeDesc
         density: part("density", density, limit)?.map(|part| part.numbers(files)).transpose()?,
         split,
         emission: colors("emission", emission, limit)?,
+        temperature: temperature(files, path, desc, medium)?,
     };
     Ok(Volume::new(medium, grids, &world_from_unit))
+}
+
+/// The temperature in kelvin.
+fn temperature(
+    files: &CompileContext,
+    path: &str,
+    desc: &MediumVolumeDesc,
+    medium: &Medium,
+) -> Result<Option<VoxelGrid<f32>>> {
+    let MediumVolumeDesc { temperature, temperature_scale, .. } = desc;
+    let (path, scale_path) = (format!("{path}.temperature"), format!("{path}.temperature_scale"));
+    let scale = temperature_scale.unwrap_or(1.0);
+    files.positive(&scale_path, f64::from(scale))?;
+    let Some(desc) = temperature else {
+        return match temperature_scale {
+            Some(_) => Err(files.error(&scale_path, "is a factor on `temperature`, which is not given")),
+            None => Ok(None),
+        };
+    };
+    if medium.emission.is_black() {
+        return Err(files.error(&path, "needs `emission` of the medium: 1 for the radiance of black bodies"));
+    }
+    let mut part = Part::read(files, path, desc, (MAX_TEMPERATURE / scale).min(f32::MAX))?;
+    part.data.values.iter_mut().for_each(|value| *value *= scale);
+    part.numbers(files).map(Some)
 }
 
 /// The map of the unit cube to the box.

@@ -6,7 +6,7 @@ use std::io::{BufWriter, Cursor, Read, Write};
 use std::path::{Path, PathBuf};
 
 use super::{Originals, folder_of, write_ply};
-use crate::assets::{Assets, RgbImage, vol_bytes};
+use crate::assets::{Assets, RgbImage, ies_bytes, vol_bytes};
 use crate::error::{Error, Result};
 use crate::file::{self, MARK, write_atomically};
 use crate::image_data::{ImageData, Samples};
@@ -205,6 +205,8 @@ impl<'a> AssetCopier<'a> {
             write_atomically(&place, |out| write_environment(image, out))?;
         } else if let Some(volume) = assets.volumes.get(name) {
             write_atomically(&place, |out| out.write_all(&vol_bytes(volume)).map_err(|e| e.to_string()))?;
+        } else if let Some(profile) = assets.profiles.get(name) {
+            write_atomically(&place, |out| out.write_all(&ies_bytes(profile)).map_err(|e| e.to_string()))?;
         }
         Ok(())
     }

@@ -57,6 +57,14 @@ pub struct MediumVolumeDesc {
     /// Factor on emission, beside that of `density`; at least 0. Default: 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub emission: Option<VolumeDesc>,
+    /// Kelvin, one number a voxel, from 0 to 1e5 with `temperature_scale`: a further factor on emission is what black
+    /// bodies of this temperature radiate, as in Blender: their colour at luminance 1 times Stefan and Boltzmann's
+    /// power in MW/(m² sr). Default: no such factor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<VolumeDesc>,
+    /// Factor on `temperature`, above 0. Default: 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature_scale: Option<f32>,
 }
 
 fn unit_cube() -> [[f64; 3]; 2] {
@@ -71,13 +79,14 @@ impl MediumVolumeDesc {
 
     /// The volumes that are there, each with its key.
     pub fn parts_mut(&mut self) -> impl Iterator<Item = (&'static str, &mut VolumeDesc)> {
-        let Self { density, albedo, absorption, scattering, emission, .. } = self;
+        let Self { density, albedo, absorption, scattering, emission, temperature, .. } = self;
         [
             ("density", density),
             ("albedo", albedo),
             ("absorption", absorption),
             ("scattering", scattering),
             ("emission", emission),
+            ("temperature", temperature),
         ]
         .into_iter()
         .filter_map(|(key, part)| part.as_mut().map(|part| (key, part)))

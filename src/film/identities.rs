@@ -18,7 +18,7 @@ const NONE: u32 = u32::MAX;
 /// - Its asset is the object that the outermost instance places, else the file that the shape comes from, else the
 ///   shape.
 ///
-/// What has no name is called after its kind, its file or its object, with the place in its list: `sphere_3`,
+/// A medium is its own object, material and asset. What else has no name is called after its kind, its file or its object, with the place in its list: `sphere_3`,
 /// `bunny_0`, `tree_17`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identities {
@@ -28,6 +28,8 @@ pub struct Identities {
     placements: Vec<Placement>,
     /// By instance of the geometry: its placement. None for those of shapes that move by themselves.
     placement_of: Vec<Option<PlacementId>>,
+    /// By medium: its name, if it has one.
+    media: Vec<Option<NameId>>,
 }
 
 /// A name of the table, or one with a number behind it.
@@ -105,18 +107,23 @@ impl Identities {
         self.placement_of.push(placement);
     }
 
+    /// Adds the next medium, called as the scene names it, if it does.
+    pub fn add_medium(&mut self, name: Option<NameId>) {
+        self.media.push(name);
+    }
+
     /// What the object is called that a shape belongs to; empty for a key that does not exist.
     pub fn object(&self, key: ShapeKey) -> Cow<'_, str> {
         match (self.placement(key), self.shape(key)) {
             (Some(placement), _) => self.placement_name(placement),
             (None, Some(shape)) => self.label(shape.label),
-            (None, None) => Cow::Borrowed(""),
+            (None, None) => Cow::Borrowed(self.medium(key)),
         }
     }
 
     /// What a shape's material is called; empty for a key that does not exist.
     pub fn material(&self, key: ShapeKey) -> &str {
-        self.shape(key).map_or("", |shape| self.name(shape.material))
+        self.shape(key).map_or_else(|| self.medium(key), |shape| self.name(shape.material))
     }
 
     /// What the asset is called that a shape belongs to; empty for a key that does not exist.
@@ -125,7 +132,7 @@ impl Identities {
             (Some(placement), _) => Cow::Borrowed(self.name(placement.asset)),
             (None, Some(ShapeIdentity { asset: Some(asset), .. })) => Cow::Borrowed(self.name(*asset)),
             (None, Some(shape)) => self.label(shape.label),
-            (None, None) => Cow::Borrowed(""),
+            (None, None) => Cow::Borrowed(self.medium(key)),
         }
     }
 
@@ -146,14 +153,26 @@ impl Identities {
         self.placement_of.len() as u32
     }
 
+    /// Number of media.
+    pub fn media(&self) -> u32 {
+        self.media.len() as u32
+    }
+
     /// Bytes of the tables.
     pub fn memory_bytes(&self) -> usize {
         let names: usize = self.names.iter().map(|name| size_of_val(name) + name.len()).sum();
-        names + size_of_val(&self.shapes[..]) + size_of_val(&self.placements[..]) + size_of_val(&self.placement_of[..])
+        let placements = size_of_val(&self.placements[..]) + size_of_val(&self.placement_of[..]);
+        names + size_of_val(&self.shapes[..]) + placements + size_of_val(&self.media[..])
     }
 
     fn shape(&self, key: ShapeKey) -> Option<&ShapeIdentity> {
-        self.shapes.get(key.shape as usize)
+        self.shapes.get(key.shape as usize).filter(|_| key.instance != ShapeKey::MEDIUM)
+    }
+
+    /// What a medium is called; empty for any other key.
+    fn medium(&self, key: ShapeKey) -> &str {
+        let name = self.media.get(key.shape as usize).filter(|_| key.instance == ShapeKey::MEDIUM);
+        name.copied().flatten().map_or("", |name| self.name(name))
     }
 
     fn placement(&self, key: ShapeKey) -> Option<&Placement> {

@@ -48,16 +48,18 @@ impl PixelSample {
 /// The shape that a sample shows, and through which instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ShapeKey {
-    /// The instance's id, or [`ShapeKey::NO_INSTANCE`].
+    /// The instance's id, [`ShapeKey::NO_INSTANCE`] or [`ShapeKey::MEDIUM`].
     pub instance: u32,
-    /// The shape's id.
+    /// The shape's id, or the medium's.
     pub shape: u32,
 }
 
 impl ShapeKey {
     /// The instance of shapes that stand in the world directly.
     pub const NO_INSTANCE: u32 = u32::MAX;
-    /// Of a sample that shows no shape.
+    /// The instance of media.
+    pub const MEDIUM: u32 = u32::MAX - 1;
+    /// Of a sample that shows nothing.
     pub const NONE: Self = Self { instance: u32::MAX, shape: u32::MAX };
 }
 

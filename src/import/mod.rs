@@ -6,13 +6,11 @@ mod faults;
 mod fingerprint;
 mod foreign;
 mod scene_file;
-mod spectrum;
 mod wording;
 
 pub use fingerprint::{SceneFingerprint, files_of_scene, scene_fingerprint};
 pub use foreign::{Draft, ImportOptions, ImportReport, Imported, Outcome, ReportEntry, read_scene};
 pub use scene_file::{load_scene, parse_scene, scene_as_written};
-pub use spectrum::{Named, Spectrum, named};
 pub use wording::describe_value;
 
 use crate::desc::SceneDesc;

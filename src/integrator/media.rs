@@ -7,7 +7,7 @@ use crate::color::Rgb;
 use crate::geometry::{Hit, SurfaceInteraction};
 use crate::id::ShapeId;
 use crate::math::{Aabb, Ray, Vec3, vec3};
-use crate::medium::{BoundaryMedia, MediumStack, RelativeIor, random_of_ray};
+use crate::medium::{BoundaryMedia, Medium, MediumStack, RelativeIor, random_of_ray};
 use crate::scene::Scene;
 
 /// Surfaces on one straight way, at most; a way along a surface must not go on for ever.
@@ -56,6 +56,27 @@ pub(super) fn bounds(scene: &Scene) -> Aabb {
         return Aabb::EMPTY;
     }
     bounds_of(scene, |id| scene.surface(id).medium.is_some())
+}
+
+/// Whether surfaces that bend light enclose each medium of a scene that scatters, and no light: there shadow rays never
+/// arrive. Empty of scenes without such media.
+pub(super) fn enclosed(scene: &Scene) -> Vec<bool> {
+    if !scene.features.participating_media {
+        return Vec::new();
+    }
+    let (media, geometry) = (&scene.media, &scene.geometry);
+    let empty = Medium::clear(0);
+    let is_enclosed = |medium: &Medium| {
+        let id = media.id(medium);
+        let mut others = media.iter().filter(|other| *other != medium).chain([&empty]);
+        let is_of = |shape: ShapeId| scene.surface(shape).medium == id;
+        !medium.scattering.is_black()
+            && media.surroundings() != Some(medium)
+            && others.all(|other| other.ior.iter().zip(medium.ior).all(|(a, b)| *a != b))
+            && !(0..geometry.shapes.len()).map(ShapeId::new).any(|id| is_of(id) && geometry.cutouts.has_holes(id))
+            && !scene.lights.is_any_within(geometry, &bounds_of(scene, is_of))
+    };
+    media.iter().map(is_enclosed).collect()
 }
 
 /// A box around the shapes that are chosen.

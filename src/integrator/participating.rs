@@ -177,7 +177,7 @@ impl World<'_> {
 
     fn first_segment(&self, id: MediumId, ray: &Ray, sample: &DistanceSample) -> Option<FirstSegment> {
         let medium = self.scene.media.get(id);
-        if medium.scattering.is_black() || medium.volume.is_some() {
+        if medium.scattering.is_black() || medium.volume.is_some() || self.enclosed_media[id.index()] {
             return None;
         }
         let (direction, length) = (ray.direction, ray.direction.length());

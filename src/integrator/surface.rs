@@ -54,6 +54,7 @@ pub(super) fn medium_aovs(pass: &PassContext, surface_aovs: SurfaceAovs, at: &Su
     if surface_aovs.geometry {
         sample.depth = camera.depth(at.p, at.time);
         sample.position = camera.render_space().world_point(at.p).as_vec3();
+        sample.visible_shape = ShapeKey { instance: ShapeKey::MEDIUM, shape: at.shape.0 };
     }
     if surface_aovs.motion {
         sample.motion = pass.render.motion_of_point(at.p).to_array();

@@ -32,6 +32,8 @@ pub struct World<'a> {
     parametrization: Vec<Parametrization>,
     /// Around all surfaces of media.
     pub(super) media_bounds: Aabb,
+    /// By medium, whether light samples cannot reach it; see [`enclosed`](super::media::enclosed).
+    pub(super) enclosed_media: Vec<bool>,
     /// Those that light enters for a random walk.
     pub(super) subsurface: SubsurfaceShapes,
 }
@@ -47,6 +49,7 @@ impl<'a> World<'a> {
             reach_squared: bounds.size().max_element().powi(2),
             parametrization: parametrization(scene),
             media_bounds: super::media::bounds(scene),
+            enclosed_media: super::media::enclosed(scene),
             subsurface: SubsurfaceShapes::new(scene),
         }
     }

@@ -4,6 +4,7 @@ use super::tree::{LightSampleContext, LightTree};
 use super::{Environment, EnvironmentMap, Light, MisCompensation};
 use crate::geometry::Geometry;
 use crate::id::LightId;
+use crate::math::Aabb;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::sampling::AliasTable;
 
@@ -122,6 +123,11 @@ impl LightSet {
     #[inline]
     pub fn get(&self, id: LightId) -> &Light {
         &self.lights[id.index()]
+    }
+
+    /// Whether a light that shines from a place may be within these bounds.
+    pub fn is_any_within(&self, geometry: &Geometry, bounds: &Aabb) -> bool {
+        self.lights.iter().filter_map(|light| light.bounds(geometry)).any(|light| light.bounds.overlaps(bounds))
     }
 
     /// Whether there are no lights at all.

@@ -56,6 +56,11 @@ impl Aabb {
     pub fn contains(&self, p: Vec3) -> bool {
         self.min.cmple(p).all() && p.cmple(self.max).all()
     }
+
+    /// Whether a point lies inside or on the boundary of both.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
+    }
 }
 
 /// An axis-aligned box in `f64`; empty when some `min > max`.

@@ -10,7 +10,7 @@ use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 use super::blocks::{BlockWalk, UnitRay};
 use super::voxels::{Interval, VoxelGrid, block_box};
-use super::{Medium, transmittance};
+use super::{Medium, blackbody, transmittance};
 use crate::color::Rgb;
 use crate::math::random::Rng;
 use crate::math::{DAffine3, DVec3, Ray, RenderSpace, Vec3};
@@ -33,6 +33,8 @@ pub struct VolumeGrids {
     pub split: ExtinctionSplit,
     /// Factor on emission.
     pub emission: Option<VoxelGrid<Rgb>>,
+    /// Kelvin; what black bodies emit there is a further factor on emission.
+    pub temperature: Option<VoxelGrid<f32>>,
 }
 
 /// How extinction is divided into absorption and scattering.
@@ -257,7 +259,7 @@ impl VolumeGrids {
             ExtinctionSplit::Factors { absorption, scattering } => [absorption.as_ref(), scattering.as_ref()],
         };
         let colors = colors.into_iter().chain([self.emission.as_ref()]).flatten().map(VoxelGrid::resolution);
-        let all = colors.chain(self.density.as_ref().map(VoxelGrid::resolution));
+        let all = colors.chain([&self.density, &self.temperature].into_iter().flatten().map(VoxelGrid::resolution));
         all.fold([1; 3], |most, n| [0, 1, 2].map(|axis| most[axis].max(n[axis])))
     }
 
@@ -276,7 +278,8 @@ impl VolumeGrids {
                 (medium.absorption * factor(absorption), medium.scattering * factor(scattering))
             }
         };
-        let emission = medium.emission * factor(&self.emission);
+        let glow = self.temperature.as_ref().map_or(Rgb::WHITE, |kelvin| blackbody(kelvin.at(p)));
+        let emission = medium.emission * factor(&self.emission) * glow;
         Coefficients {
             absorption: absorption * density,
             scattering: scattering * density,
@@ -287,7 +290,10 @@ impl VolumeGrids {
     fn bounds(&self, medium: &Medium, [min, max]: [Vec3; 2]) -> CoefficientBounds {
         let one = Interval { min: Rgb::WHITE, max: Rgb::WHITE };
         let of = |grid: &Option<VoxelGrid<Rgb>>| grid.as_ref().map_or(one, |grid| grid.bounds(min, max));
-        let density = self.density.as_ref().map_or(Interval { min: 1.0, max: 1.0 }, |density| density.bounds(min, max));
+        let number = |grid: &Option<VoxelGrid<f32>>| {
+            grid.as_ref().map_or(Interval { min: 1.0, max: 1.0 }, |grid| grid.bounds(min, max))
+        };
+        let density = number(&self.density);
         let extinction = match &self.split {
             ExtinctionSplit::Even | ExtinctionSplit::Albedo(_) => {
                 Interval { min: medium.extinction(), max: medium.extinction() }
@@ -300,7 +306,8 @@ impl VolumeGrids {
         };
         CoefficientBounds {
             extinction: Interval { min: extinction.min * density.min, max: extinction.max * density.max },
-            emits: !(medium.emission * of(&self.emission).max * density.max).is_black(),
+            emits: number(&self.temperature).max > 0.0
+                && !(medium.emission * of(&self.emission).max * density.max).is_black(),
         }
     }
 }

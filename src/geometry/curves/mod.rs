@@ -88,6 +88,10 @@ impl Curves {
         if counts.is_empty() {
             return Err(CurvesError::Empty);
         }
+        let counted = counts.iter().fold(0usize, |sum, &count| sum.saturating_add(count as usize));
+        if counted != points.len() {
+            return Err(CurvesError::Counts { counted, points: points.len() });
+        }
         check_points(&points)?;
         let (mut segments, mut firsts, mut first) = (Vec::new(), Vec::with_capacity(counts.len() + 1), 0usize);
         for (strand, &count) in counts.iter().enumerate() {
@@ -98,9 +102,6 @@ impl Curves {
                 segments.push(index(first + i * basis.stride())?);
             }
             first += count as usize;
-        }
-        if first != points.len() {
-            return Err(CurvesError::Counts { counted: first, points: points.len() });
         }
         firsts.push(index(segments.len())?);
         segments.shrink_to_fit();

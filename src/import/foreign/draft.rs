@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::{ImportReport, Imported, Outcome, ReportEntry};
-use crate::assets::{Assets, MeshData, RgbImage, VolumeData};
+use crate::assets::{Assets, IesData, MeshData, RgbImage, VolumeData};
 use crate::desc::{
     CameraDesc, InstanceDesc, KeyframeDesc, LightDesc, MaterialDesc, MediumDesc, ObjectDesc, SceneDesc, ShapeDesc,
     TextureDesc, TransformDesc, TransformStepDesc,
@@ -149,6 +149,13 @@ impl Draft {
     pub fn keep_volume(&mut self, name: &str, volume: VolumeData) -> String {
         let file = self.numbers.unique_file(name, "vol", &self.assets);
         self.assets.volumes.insert(file.clone(), volume);
+        file
+    }
+
+    /// Keeps a light's intensity by direction; the result is used in place of its file's name.
+    pub fn keep_profile(&mut self, name: &str, profile: IesData) -> String {
+        let file = self.numbers.unique_file(name, "ies", &self.assets);
+        self.assets.profiles.insert(file.clone(), profile);
         file
     }
 

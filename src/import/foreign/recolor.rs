@@ -50,17 +50,22 @@ pub fn recolored(
 
 /// An image as floats with its colours changed; alpha is left out.
 fn recolored_image(image: &ImageData, is_srgb: bool, change: &dyn Fn([f32; 3]) -> [f32; 3]) -> ImageData {
-    let decode = |x: f32| if is_srgb { linear_from_srgb(x) } else { x };
-    let value = |i: usize| match &image.samples {
+    let samples = linear_pixels(image, is_srgb).flat_map(|pixel| change(pixel).map(f16::from_f32)).collect();
+    ImageData { width: image.width, height: image.height, channels: 3, samples: Samples::F16(samples) }
+}
+
+/// The linear colours of an image, whose whole numbers are sRGB or linear; alpha is left out.
+pub fn linear_pixels(image: &ImageData, is_srgb: bool) -> impl Iterator<Item = [f32; 3]> {
+    let decode = move |x: f32| if is_srgb { linear_from_srgb(x) } else { x };
+    let value = move |i: usize| match &image.samples {
         Samples::U8(v) => v.get(i).map_or(0.0, |&x| decode(f32::from(x) / 255.0)),
         Samples::U16(v) => v.get(i).map_or(0.0, |&x| decode(f32::from(x) / 65535.0)),
         Samples::F16(v) => v.get(i).map_or(0.0, |x| x.to_f32()),
         Samples::F32(v) => v.get(i).copied().unwrap_or_default(),
     };
     let is_grey = image.channels < 3;
-    let pixel = |i: usize| change(std::array::from_fn(|k| value(i * image.channels + if is_grey { 0 } else { k })));
-    let samples = (0..image.width * image.height).flat_map(|i| pixel(i).map(f16::from_f32)).collect();
-    ImageData { width: image.width, height: image.height, channels: 3, samples: Samples::F16(samples) }
+    (0..image.width * image.height)
+        .map(move |i| std::array::from_fn(|k| value(i * image.channels + if is_grey { 0 } else { k })))
 }
 
 #[cfg(test)]

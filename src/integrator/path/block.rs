@@ -23,6 +23,10 @@ pub(super) mod vertex_flags {
     pub const MISS: u32 = 4;
     /// A medium scatters here, whose id is in place of the shape's.
     pub const MEDIUM: u32 = 8;
+    /// No shadow ray from here reaches a light.
+    pub const ENCLOSED: u32 = 16;
+    /// Where no light is sampled.
+    pub const UNSAMPLED: u32 = DELTA | MISS | ENCLOSED;
 }
 
 /// What has become of a ray that a vertex was to spawn.

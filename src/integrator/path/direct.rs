@@ -59,8 +59,7 @@ fn choose_lights(context: &Context, vertices: &mut Vertices, queue: &mut LightQu
         compensation: context.compensation,
     };
     queue.clear();
-    for lane in (0..vertices.count.min(BATCH))
-        .filter(|&lane| vertices.rows.flags[lane] & (vertex_flags::DELTA | vertex_flags::MISS) == 0)
+    for lane in (0..vertices.count.min(BATCH)).filter(|&lane| vertices.rows.flags[lane] & vertex_flags::UNSAMPLED == 0)
     {
         let from = vertices.light_context(lane);
         queue.push(&light_context, lane, &from, vertices.u_light.of(lane), &mut vertices.light_samples);

@@ -6,6 +6,7 @@ use super::wave::{Wave, path_flags};
 use crate::bsdf::{Bsdf, BsdfQueryRows, Lambert};
 use crate::color::Rgb;
 use crate::id::{MediumId, ShapeId};
+use crate::integrator::World;
 use crate::material::Material;
 use crate::math::compact::sort_lanes;
 use crate::math::rows::{BATCH, Row};
@@ -84,7 +85,7 @@ pub(super) fn evaluate(context: &Context, wave: &mut Wave, block: usize) {
     let scene = context.scene;
     for lane in 0..vertices.count.min(BATCH) {
         if vertices.rows.flags[lane] & (vertex_flags::MISS | vertex_flags::MEDIUM) != 0 {
-            evaluate_without_surface(scene, vertices, lane);
+            evaluate_without_surface(context.world, vertices, lane);
             continue;
         }
         let surface = scene.surface(ShapeId(vertices.rows.shape[lane]));
@@ -110,14 +111,16 @@ pub(super) fn evaluate(context: &Context, wave: &mut Wave, block: usize) {
 
 /// Sets the scattering of a medium, or nothing where the ray met nothing.
 #[inline(never)]
-fn evaluate_without_surface(scene: &Scene, vertices: &mut Vertices, lane: usize) {
+fn evaluate_without_surface(world: &World, vertices: &mut Vertices, lane: usize) {
     if vertices.is_miss(lane) {
         set_diffuse(vertices, lane, Rgb::BLACK);
         return;
     }
-    let phase = scene.media.get(MediumId(vertices.rows.shape[lane])).phase;
+    let id = MediumId(vertices.rows.shape[lane]);
+    let phase = world.scene.media.get(id).phase;
     set_non_diffuse(&mut vertices.rows, &mut vertices.non_diffuse, lane, &Bsdf::Phase(phase));
-    vertices.rows.flags[lane] |= vertex_flags::MEDIUM;
+    let enclosed = if world.enclosed_media[id.index()] { vertex_flags::ENCLOSED } else { 0 };
+    vertices.rows.flags[lane] |= vertex_flags::MEDIUM | enclosed;
     vertices.bsdfs.set_made(lane, Bsdf::Phase(phase));
 }
 

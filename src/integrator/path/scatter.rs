@@ -1,7 +1,7 @@
 //! Scattering: a direction for each vertex, Russian roulette, and the rays that go on.
 
 use super::Context;
-use super::block::{PointRows, ScatterRows, VertexRows, Vertices, spawn};
+use super::block::{PointRows, ScatterRows, VertexRows, Vertices, spawn, vertex_flags};
 use super::direct::{can_be_below, shadowing};
 use super::guided::Regions;
 use super::terminator;
@@ -149,7 +149,8 @@ fn spawn_rays<const PERTURBED: bool>(
         scatter.origin.set(i, start.ray_along(direction).origin);
         scatter.direction.set(i, direction);
         let is_delta = scatter.is_delta[i] != 0;
-        let specular = if is_delta | rule.no_lights { path_flags::SPECULAR } else { 0 };
+        let is_unsampled = is_delta | rule.no_lights | (rows.flags[i] & vertex_flags::ENCLOSED != 0);
+        let specular = if is_unsampled { path_flags::SPECULAR } else { 0 };
         let non_specular =
             if is_delta { rows.path_flags[i] & path_flags::ANY_NON_SPECULAR } else { path_flags::ANY_NON_SPECULAR };
         scatter.path_flags[i] = specular | non_specular;

@@ -308,8 +308,7 @@ impl Wave {
                 walks[to] = super::subsurface::after(context, vertices, lane);
             }
             if let Some(&cone) = cones.get(path) {
-                let is_specular = scatter.path_flags[lane] & path_flags::SPECULAR != 0;
-                let pdf = if is_specular { f32::INFINITY } else { scatter.pdf[lane] };
+                let pdf = if scatter.is_delta[lane] != 0 { f32::INFINITY } else { scatter.pdf[lane] };
                 cones[to] = context.pass.render.scattered_cone(cone, vertices.rows.t[lane], pdf);
             }
             if let Some(&state) = caustics.get(path) {

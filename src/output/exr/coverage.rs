@@ -77,7 +77,7 @@ pub fn numbers(kind: LayerKind, coverage: &Coverage, identities: &Identities) ->
     let names = names_of(coverage, |key| name_of(kind, identities, key));
     let table = table(kind, identities);
     let number = |key: ShapeKey, name: &str| match kind {
-        LayerKind::InstanceId if key.instance == ShapeKey::NO_INSTANCE => 0,
+        LayerKind::InstanceId if [ShapeKey::NO_INSTANCE, ShapeKey::MEDIUM].contains(&key.instance) => 0,
         LayerKind::InstanceId => key.instance + 1,
         _ => table.get(name).copied().unwrap_or(0),
     };
@@ -131,8 +131,9 @@ fn names_of<'a>(coverage: &Coverage, name: impl Fn(ShapeKey) -> Cow<'a, str>) ->
 fn table(kind: LayerKind, identities: &Identities) -> HashMap<String, u32> {
     let instances = (0..identities.instances()).map(|instance| ShapeKey { instance, shape: u32::MAX });
     let shapes = (0..identities.shapes()).map(|shape| ShapeKey { instance: ShapeKey::NO_INSTANCE, shape });
+    let media = (0..identities.media()).map(|medium| ShapeKey { instance: ShapeKey::MEDIUM, shape: medium });
     let mut table = HashMap::new();
-    for key in instances.chain(shapes) {
+    for key in instances.chain(shapes).chain(media) {
         let name = name_of(kind, identities, key);
         let next = table.len() as u32 + 1;
         if !name.is_empty() && !table.contains_key(&*name) {

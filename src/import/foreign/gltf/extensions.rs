@@ -86,6 +86,11 @@ extensions! {
         attenuation_distance: f32 = f32::INFINITY,
         attenuation_color: [f32; 3] = [1.0; 3],
     }
+    VolumeScatter {
+        multiscatter_color: [f32; 3] = [0.0; 3],
+        scatter_anisotropy: f32 = 0.0,
+    }
+    DiffuseTransmission { diffuse_transmission_factor: f32 = 0.0, }
     Clearcoat {
         clearcoat_factor: f32 = 0.0,
         clearcoat_texture: Option<TextureInfo> = None,

@@ -5,7 +5,7 @@ use super::element::Element;
 use super::tree::{Place, Property, Spectrum, Value};
 use super::values;
 use crate::error::{Error, Result};
-use crate::import::spectrum;
+use crate::spectrum;
 
 /// More samples than any spectrum has.
 const MAX_SAMPLES: usize = 100_000;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::params::{Param, Params, Values};
 use crate::error::{Error, Result};
-use crate::import::{Named, Spectrum, named};
+use crate::spectrum::{Named, Spectrum, named};
 
 /// The colour space of `rgb` parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

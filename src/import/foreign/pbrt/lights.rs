@@ -7,11 +7,12 @@ use super::state::{Ctm, World, matrix, rotation_and_scale};
 use super::textures::bilinear_image;
 use crate::assets::{RgbImage, read_image, read_rgb_image};
 use crate::desc::{
-    ColorSpaceDesc, DirectionalLightDesc, EnvironmentLightDesc, LightDesc, PointLightDesc, ProjectorLightDesc,
-    SpotLightDesc, WrapDesc,
+    ColorSpaceDesc, DirectionalLightDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, PointLightDesc,
+    ProjectorLightDesc, SpotLightDesc, WrapDesc,
 };
 use crate::error::Result;
 use crate::import::foreign::Draft;
+use crate::import::foreign::recolor::linear_pixels;
 use crate::math::{DAffine3, DMat3, DVec3};
 
 /// Reads a `LightSource`. pbrt divides each light by what its spectrum measures in nits, and the film takes a nit as 1.
@@ -64,12 +65,7 @@ impl Lights<'_> {
                     group: None,
                 })
             }
-            "goniometric" => {
-                params.ignore("filename", "the same intensity in all directions");
-                draft.approximated(&params.place, &params.element, "", "a point light, the same in all directions");
-                let intensity = self.emitted(params, "I", 4.0 * std::f64::consts::PI)?;
-                LightDesc::Point(PointLightDesc { position: map.translation.to_array(), intensity, group: None })
-            }
+            "goniometric" => self.goniometric(draft, params, &map)?,
             "spot" => self.spot(params, point("from", [0.0; 3])?, point("to", [0.0, 0.0, 1.0])?)?,
             "distant" => {
                 let direction = point("to", [0.0, 0.0, 1.0])? - point("from", [0.0; 3])?;
@@ -91,6 +87,44 @@ impl Lights<'_> {
         params.report(draft);
         draft.add_light(&params.place, light);
         Ok(())
+    }
+
+    /// A point light whose intensity is an image by direction.
+    fn goniometric(&self, draft: &mut Draft, params: &Params, map: &DAffine3) -> Result<LightDesc> {
+        let (position, whole) = (map.translation.to_array(), 4.0 * std::f64::consts::PI);
+        let Some(file) = params.string("filename")? else {
+            let intensity = self.emitted(params, "I", whole)?;
+            return Ok(LightDesc::Point(PointLightDesc { position, intensity, group: None }));
+        };
+        let asset = self.colors.folder.join(file);
+        let image = read_image(&asset)
+            .map_err(|error| error.at(self.scene, &format!("{}: {}", params.place, params.element), &asset))?;
+        let pixels = linear_pixels(&image, true).collect();
+        let image = RgbImage { width: image.width, height: image.height, pixels };
+        if image.width != image.height {
+            return Err(params.error("the image of a goniometric light must be square: an equal-area map"));
+        }
+        if rotation_and_scale(&map.matrix3).is_none() {
+            return Err(params.error("the transform is singular"));
+        }
+        let sum: f64 = image.pixels.iter().map(|pixel| f64::from(octahedral::mean(*pixel))).sum();
+        let mean = if sum > 0.0 { sum / image.pixels.len() as f64 } else { 1.0 };
+        let light_from_world = map.matrix3.inverse();
+        // The image's z is the light's y.
+        let profile = octahedral::profile(&image, |direction| {
+            let local = light_from_world * direction;
+            DVec3::new(local.x, local.z, local.y)
+        });
+        params.approximate("filename", "interpolated between directions");
+        let name = std::path::Path::new(file).file_stem().map_or_else(|| "light".into(), |stem| stem.to_string_lossy());
+        Ok(LightDesc::Ies(IesLightDesc {
+            file: draft.keep_profile(&name, profile),
+            position,
+            look_at: None,
+            rotation_degrees: 0.0,
+            intensity: self.emitted(params, "I", whole * mean)?,
+            group: None,
+        }))
     }
 
     /// A projector, whose shorter side has the angle `fov`.

@@ -11,7 +11,7 @@ use crate::desc::{
 use crate::error::Result;
 use crate::import::foreign::Draft;
 use crate::import::foreign::recolor::recolored;
-use crate::import::{Named, named};
+use crate::spectrum::{Named, named};
 
 /// A surface is smooth below this alpha, along both axes.
 const SMOOTH_ALPHA: f32 = 1e-3;

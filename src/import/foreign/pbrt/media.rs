@@ -92,7 +92,9 @@ impl MediumTable {
         let is_grid = volume.is_some();
         let brightness = if is_grid { 1.0 } else { params.number_or("Lescale", 1.0)? as f32 };
         let radiance = if is_rgb_grid { None } else { colors.get(params, "Le", Meaning::Emission)? };
-        let radiance = radiance.unwrap_or([0.0; 3]);
+        // Black bodies have a colour of their own.
+        let glows = kind == "uniformgrid" && params.has("temperature");
+        let radiance = if glows { [1.0; 3] } else { radiance.unwrap_or([0.0; 3]) };
         let emission = [0, 1, 2].map(|i| radiance[i].max(0.0) * brightness * absorption[i]);
         let g = params.number_or("g", 0.0)?;
         if g.abs() > MAX_G {

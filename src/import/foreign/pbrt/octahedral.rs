@@ -3,11 +3,14 @@
 
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
-use crate::assets::RgbImage;
+use crate::assets::{IesData, RgbImage};
 use crate::math::DVec3;
 
 /// Rows of the lat-long image at most.
 const MAX_ROWS: f64 = 4096.0;
+
+/// Steps from pole to pole of a table of intensities at most.
+const MAX_STEPS: usize = 720;
 
 /// Lookups along each side of a pixel of the lat-long image.
 const SUBSAMPLES: usize = 4;
@@ -59,6 +62,30 @@ pub fn lat_long(image: &RgbImage, mirrored: bool) -> RgbImage {
         }
     }
     RgbImage { width, height, pixels }
+}
+
+/// The means of the channels of a square equal-area image by direction, about a nadir of -y from +x towards -z: as the
+/// profile of a light that hangs straight. `image_from_world` turns directions into the image's, in which z is up.
+pub fn profile(image: &RgbImage, image_from_world: impl Fn(DVec3) -> DVec3) -> IesData {
+    // Twice as fine as the pixels.
+    let steps = (2 * image.height).clamp(8, MAX_STEPS);
+    let angles = |count: usize| -> Vec<f32> { (0..=count).map(|i| (180.0 * i as f64 / steps as f64) as f32).collect() };
+    let (vertical, horizontal) = (angles(steps), angles(2 * steps));
+    let mut candela = Vec::with_capacity(vertical.len() * horizontal.len());
+    for around in &horizontal {
+        let (sin, cos) = f64::from(*around).to_radians().sin_cos();
+        for from_nadir in &vertical {
+            let (across, down) = f64::from(*from_nadir).to_radians().sin_cos();
+            let world = DVec3::new(across * cos, -down, -across * sin);
+            candela.push(mean(lookup(image, square_from_direction(image_from_world(world)))));
+        }
+    }
+    IesData { vertical, horizontal, candela }
+}
+
+/// The mean of the channels, as pbrt takes it where it needs one number.
+pub fn mean(rgb: [f32; 3]) -> f32 {
+    (rgb.iter().sum::<f32>() / 3.0).clamp(0.0, f32::MAX)
 }
 
 /// A direction of the lat-long image: the top is +y, the middle column -z, and +x lies at three quarters of the width.

@@ -24,9 +24,10 @@ pub struct Measured {
 const MILK: Measured =
     Measured { name: "Wholemilk", scattering: [2.55, 3.21, 3.77], absorption: [0.0011, 0.0024, 0.014] };
 
-/// Jensen, Marschner, Levoy and Hanrahan, "A Practical Model for Subsurface Light Transport", figure 5.
+/// Jensen, Marschner, Levoy and Hanrahan, "A Practical Model for Subsurface Light Transport", figure 5; then Narasimhan
+/// et al., "Acquiring Scattering Properties of Participating Media by Dilution", table 1.
 #[rustfmt::skip]
-const MEASURED: [Measured; 12] = [
+const MEASURED: [Measured; 47] = [
     Measured { name: "Apple", scattering: [2.29, 2.39, 1.97], absorption: [0.0030, 0.0034, 0.046] },
     Measured { name: "Chicken1", scattering: [0.15, 0.21, 0.38], absorption: [0.015, 0.077, 0.19] },
     Measured { name: "Chicken2", scattering: [0.19, 0.25, 0.32], absorption: [0.018, 0.088, 0.20] },
@@ -39,6 +40,41 @@ const MEASURED: [Measured; 12] = [
     Measured { name: "Skin2", scattering: [1.09, 1.59, 1.79], absorption: [0.013, 0.070, 0.145] },
     Measured { name: "Spectralon", scattering: [11.6, 20.4, 14.9], absorption: [0.0; 3] },
     MILK,
+    Measured { name: "Lowfat Milk", scattering: [0.89187, 1.5136, 2.532], absorption: [0.002875, 0.00575, 0.0115] },
+    Measured { name: "Reduced Milk", scattering: [2.4858, 3.1669, 4.5214], absorption: [0.0025556, 0.0051111, 0.012778] },
+    Measured { name: "Regular Milk", scattering: [4.5513, 5.8294, 7.136], absorption: [0.0015333, 0.0046, 0.019933] },
+    Measured { name: "Espresso", scattering: [0.72378, 0.84557, 1.0247], absorption: [4.7984, 6.5751, 8.8493] },
+    Measured { name: "Mint Mocha Coffee", scattering: [0.31602, 0.38538, 0.48131], absorption: [3.772, 5.8228, 7.82] },
+    Measured { name: "Lowfat Soy Milk", scattering: [0.30576, 0.34233, 0.61664], absorption: [0.0014375, 0.0071875, 0.035937] },
+    Measured { name: "Regular Soy Milk", scattering: [0.59223, 0.73866, 1.4693], absorption: [0.0019167, 0.0095833, 0.065167] },
+    Measured { name: "Lowfat Chocolate Milk", scattering: [0.64925, 0.83916, 1.1057], absorption: [0.0115, 0.0368, 0.1564] },
+    Measured { name: "Regular Chocolate Milk", scattering: [1.4585, 2.1289, 2.9527], absorption: [0.010063, 0.043125, 0.14375] },
+    Measured { name: "Coke", scattering: [8.9053e-05, 8.372e-05, 0.0], absorption: [0.10014, 0.16503, 0.2468] },
+    Measured { name: "Pepsi", scattering: [6.1697e-05, 4.2564e-05, 0.0], absorption: [0.091641, 0.14158, 0.20729] },
+    Measured { name: "Sprite", scattering: [6.0306e-06, 6.4139e-06, 6.5504e-06], absorption: [0.001886, 0.0018308, 0.0020025] },
+    Measured { name: "Gatorade", scattering: [0.0024574, 0.003007, 0.0037325], absorption: [0.024794, 0.019289, 0.008878] },
+    Measured { name: "Chardonnay", scattering: [1.7982e-05, 1.3758e-05, 1.2023e-05], absorption: [0.010782, 0.011855, 0.023997] },
+    Measured { name: "White Zinfandel", scattering: [1.7501e-05, 1.9069e-05, 1.288e-05], absorption: [0.012072, 0.016184, 0.019843] },
+    Measured { name: "Merlot", scattering: [2.1129e-05, 0.0, 0.0], absorption: [0.11632, 0.25191, 0.29434] },
+    Measured { name: "Budweiser Beer", scattering: [2.4356e-05, 2.4079e-05, 1.0564e-05], absorption: [0.011492, 0.024911, 0.057786] },
+    Measured { name: "Coors Light Beer", scattering: [5.0922e-05, 4.301e-05, 0.0], absorption: [0.006164, 0.013984, 0.034983] },
+    Measured { name: "Clorox", scattering: [0.0024035, 0.0031373, 0.003991], absorption: [0.0033542, 0.014892, 0.026297] },
+    Measured { name: "Apple Juice", scattering: [0.00013612, 0.00015836, 0.000227], absorption: [0.012957, 0.023741, 0.052184] },
+    Measured { name: "Cranberry Juice", scattering: [0.00010402, 0.00011646, 7.8139e-05], absorption: [0.039437, 0.094223, 0.12426] },
+    Measured { name: "Grape Juice", scattering: [5.382e-05, 0.0, 0.0], absorption: [0.10404, 0.23958, 0.29325] },
+    Measured { name: "Ruby Grapefruit Juice", scattering: [0.011002, 0.010927, 0.011036], absorption: [0.085867, 0.18314, 0.25262] },
+    Measured { name: "White Grapefruit Juice", scattering: [0.22826, 0.23998, 0.32748], absorption: [0.0138, 0.018831, 0.056781] },
+    Measured { name: "Shampoo", scattering: [0.0007176, 0.0008303, 0.0009016], absorption: [0.014107, 0.045693, 0.061717] },
+    Measured { name: "Strawberry Shampoo", scattering: [0.00015671, 0.00015947, 1.518e-05], absorption: [0.01449, 0.05796, 0.075823] },
+    Measured { name: "Head & Shoulders Shampoo", scattering: [0.023805, 0.028804, 0.034306], absorption: [0.084621, 0.15688, 0.20365] },
+    Measured { name: "Lemon Tea Powder", scattering: [0.040224, 0.045264, 0.051081], absorption: [2.4288, 4.5757, 7.2127] },
+    Measured { name: "Orange Powder", scattering: [0.00015617, 0.00017482, 0.0001762], absorption: [0.001449, 0.003441, 0.007863] },
+    Measured { name: "Pink Lemonade Powder", scattering: [0.00012103, 0.00013073, 0.00012528], absorption: [0.001165, 0.002366, 0.003195] },
+    Measured { name: "Cappuccino Powder", scattering: [1.8436, 2.5851, 2.1662], absorption: [35.844, 49.547, 61.084] },
+    Measured { name: "Salt Powder", scattering: [0.027333, 0.032451, 0.031979], absorption: [0.28415, 0.3257, 0.34148] },
+    Measured { name: "Sugar Powder", scattering: [0.00022272, 0.00025513, 0.000271], absorption: [0.012638, 0.031051, 0.050124] },
+    Measured { name: "Suisse Mocha Powder", scattering: [2.7979, 3.5452, 4.3365], absorption: [17.502, 27.004, 35.433] },
+    Measured { name: "Pacific Ocean Surface Water", scattering: [0.0001764, 0.00032095, 0.00019617], absorption: [0.031845, 0.031324, 0.030147] },
 ];
 
 /// The medium of this name, if it is known.

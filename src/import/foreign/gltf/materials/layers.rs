@@ -4,11 +4,13 @@
 use super::super::extensions as ext;
 use super::super::textures::TextureRef;
 use super::Builder;
+use crate::color::Rgb;
 use crate::desc::{
-    AbsorptionDesc, ChannelDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, PrincipledDesc, RangedDesc,
-    RoughnessDesc, ScalarDesc,
+    AbsorptionDesc, ChannelDesc, CoefficientDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc,
+    MediumDesc, PhaseDesc, PrincipledDesc, RangedDesc, RoughnessDesc, ScalarDesc, SubsurfaceMethodDesc,
 };
 use crate::error::Result;
+use crate::medium::Subsurface;
 
 const IOR: &str = "KHR_materials_ior";
 const SPECULAR: &str = "KHR_materials_specular";
@@ -16,6 +18,8 @@ const SHEEN: &str = "KHR_materials_sheen";
 const ANISOTROPY: &str = "KHR_materials_anisotropy";
 const TRANSMISSION: &str = "KHR_materials_transmission";
 const VOLUME: &str = "KHR_materials_volume";
+const VOLUME_SCATTER: &str = "KHR_materials_volume_scatter";
+const DIFFUSE_TRANSMISSION: &str = "KHR_materials_diffuse_transmission";
 const DISPERSION: &str = "KHR_materials_dispersion";
 const CLEARCOAT: &str = "KHR_materials_clearcoat";
 
@@ -42,7 +46,7 @@ impl Builder<'_, '_> {
         }
         desc.ior = Some(RangedDesc::Constant(kept));
         let Some(specular) = self.extension::<ext::Specular>(SPECULAR)? else { return Ok(()) };
-        if self.has_transmission() {
+        if self.has(TRANSMISSION) {
             self.ignored(SPECULAR, "glass reflects by its index of refraction");
             return Ok(());
         }
@@ -122,25 +126,53 @@ impl Builder<'_, '_> {
 
     /// What changes its colour with the angle does not here.
     pub(super) fn iridescence(&mut self) {
-        let names = ["KHR_materials_iridescence", "KHR_materials_diffuse_transmission", "KHR_materials_subsurface"];
-        for name in names {
-            if self.extensions().is_some_and(|all| all.contains_key(name)) {
+        for name in ["KHR_materials_iridescence", "KHR_materials_subsurface"] {
+            if self.has(name) {
                 self.ignored(name, "not read");
             }
         }
     }
 
-    fn has_transmission(&self) -> bool {
-        self.extensions().is_some_and(|all| all.contains_key(TRANSMISSION))
+    fn has(&self, extension: &str) -> bool {
+        self.extensions().is_some_and(|all| all.contains_key(extension))
+    }
+
+    /// What is dense below a surface that transmits diffusely, as a random walk.
+    pub(super) fn walk_below(&mut self, desc: &mut PrincipledDesc) -> Result<()> {
+        let Some(below) = self.extension::<ext::DiffuseTransmission>(DIFFUSE_TRANSMISSION)? else { return Ok(()) };
+        let share = self.inputs.share(below.diffuse_transmission_factor);
+        let volume = self.extension::<ext::Volume>(VOLUME)?.as_ref().and_then(absorption);
+        let scatter = self.extension::<ext::VolumeScatter>(VOLUME_SCATTER)?;
+        let (Some(volume), Some(scatter), false) = (volume, scatter, self.has(TRANSMISSION)) else {
+            self.ignored(DIFFUSE_TRANSMISSION, "read only beside a volume that scatters");
+            return Ok(());
+        };
+        let [absorption, scattering] = coefficients(&volume, &scatter);
+        let g = scatter.anisotropy();
+        desc.base_color = ColorDesc::Rgb(scatter.multiscatter_color.map(|c| self.inputs.share(c)));
+        desc.subsurface = ScalarDesc::Constant(share);
+        desc.subsurface_method = SubsurfaceMethodDesc::RandomWalk;
+        let reduced = [0, 1, 2].map(|i| absorption[i] + (1.0 - g) * scattering[i]);
+        desc.subsurface_radius = Some(CoefficientDesc::Rgb(reduced.map(|c| c.recip().clamp(1e-12, 1e12))));
+        desc.subsurface_anisotropy = (g != 0.0).then_some(g);
+        for name in [VOLUME, VOLUME_SCATTER, DIFFUSE_TRANSMISSION] {
+            self.approximated(name, "a random walk below a surface of the colour of multiple scattering");
+        }
+        Ok(())
     }
 
     /// Glass: thin without a thickness, a medium if it absorbs or disperses and is glass all over.
     pub(super) fn transmission(&mut self, mut desc: PrincipledDesc) -> Result<MaterialDesc> {
         let volume = self.extension::<ext::Volume>(VOLUME)?;
+        let scatter = self.extension::<ext::VolumeScatter>(VOLUME_SCATTER)?;
         let abbe =
             self.extension::<ext::Dispersion>(DISPERSION)?.map(|d| d.dispersion).filter(|d| *d > 0.0).map(|d| 20.0 / d);
         let Some(transmission) = self.extension::<ext::Transmission>(TRANSMISSION)? else {
-            for (name, is_there) in [(VOLUME, volume.is_some()), (DISPERSION, abbe.is_some())] {
+            if desc.subsurface_radius.is_some() {
+                return Ok(MaterialDesc::Principled(Box::new(desc)));
+            }
+            let given = [(VOLUME, volume.is_some()), (VOLUME_SCATTER, scatter.is_some()), (DISPERSION, abbe.is_some())];
+            for (name, is_there) in given {
                 if is_there {
                     self.ignored(name, "no light enters the material");
                 }
@@ -164,9 +196,12 @@ impl Builder<'_, '_> {
             if abbe.is_some() {
                 self.ignored(DISPERSION, "the surface is thin: nothing is bent");
             }
+            if scatter.is_some() {
+                self.ignored(VOLUME_SCATTER, "the surface is thin");
+            }
             return Ok(MaterialDesc::Principled(Box::new(desc)));
         }
-        Ok(self.solid_glass(desc, volume.as_ref(), abbe))
+        Ok(self.solid_glass(desc, volume.as_ref(), scatter.as_ref(), abbe))
     }
 
     /// Glass that is not thin: a dielectric if it absorbs or disperses and is glass all over.
@@ -174,6 +209,7 @@ impl Builder<'_, '_> {
         &mut self,
         mut desc: PrincipledDesc,
         volume: Option<&ext::Volume>,
+        scatter: Option<&ext::VolumeScatter>,
         abbe: Option<f32>,
     ) -> MaterialDesc {
         // Glass that is not thin has an index that bends light.
@@ -183,15 +219,21 @@ impl Builder<'_, '_> {
         };
         desc.ior = Some(RangedDesc::Constant(ior));
         desc.specular = None;
-        let absorption = volume.and_then(absorption);
+        let mut absorption = volume.and_then(absorption);
         if absorption.is_none() && abbe.is_none() {
             self.mapped(VOLUME);
+            if scatter.is_some() {
+                self.mapped(VOLUME_SCATTER);
+            }
             return MaterialDesc::Principled(Box::new(desc));
         }
         let is_glass =
             matches!((&desc.transmission, &desc.metallic), (ScalarDesc::Constant(1.0), ScalarDesc::Constant(0.0)));
         if !is_glass {
             self.approximated(VOLUME, "nothing is absorbed within what is glass only in part");
+            if scatter.is_some() {
+                self.ignored(VOLUME_SCATTER, "the material is glass only in part");
+            }
             return MaterialDesc::Principled(Box::new(desc));
         }
         let is_white = matches!(desc.base_color, ColorDesc::Rgb([1.0, 1.0, 1.0]));
@@ -203,6 +245,17 @@ impl Builder<'_, '_> {
         if abbe.is_some() {
             self.mapped(DISPERSION);
         }
+        let medium = scatter.map(|scatter| {
+            self.mapped(VOLUME_SCATTER);
+            let [absorption, scattering] = absorption.take().map_or([[0.0; 3]; 2], |a| coefficients(&a, scatter));
+            let medium = MediumDesc {
+                absorption: CoefficientDesc::Rgb(absorption),
+                scattering: CoefficientDesc::Rgb(scattering),
+                phase: PhaseDesc::HenyeyGreenstein { g: scatter.anisotropy() },
+                ..MediumDesc::default()
+            };
+            self.draft.add_medium(&self.name, &self.path, medium)
+        });
         let roughness = match desc.roughness {
             ScalarDesc::Constant(0.0) => None,
             ScalarDesc::Constant(roughness) => Some(RoughnessDesc::Isotropic(roughness)),
@@ -218,7 +271,7 @@ impl Builder<'_, '_> {
             transmission_tint: ColorDesc::Grey(1.0),
             priority: None,
             absorption,
-            medium: None,
+            medium,
             abbe: abbe.map(|abbe| abbe.clamp(1.0, 1000.0)),
         }))
     }
@@ -244,7 +297,7 @@ impl Builder<'_, '_> {
             ChannelDesc::G,
             coat.clearcoat_roughness_factor,
         )?;
-        let is_opaque = !self.has_transmission()
+        let is_opaque = !self.has(TRANSMISSION)
             || matches!(&base, MaterialDesc::Principled(p) if matches!(p.transmission, ScalarDesc::Constant(0.0)));
         if !is_opaque {
             return Ok(self.coated_glass(base, amount, &roughness));
@@ -304,4 +357,23 @@ fn absorption(volume: &ext::Volume) -> Option<AbsorptionDesc> {
     let absorbs = distance > 0.0 && distance.is_finite() && color != [1.0; 3];
     absorbs
         .then(|| AbsorptionDesc { color: color.map(|c| if c.is_nan() { 1.0 } else { c.clamp(1e-4, 1.0) }), distance })
+}
+
+impl ext::VolumeScatter {
+    fn anisotropy(&self) -> f32 {
+        if self.scatter_anisotropy.is_nan() { 0.0 } else { self.scatter_anisotropy.clamp(-0.99, 0.99) }
+    }
+}
+
+/// Coefficients of absorption and scattering of a medium whose extinction is that of `AbsorptionDesc`, and whose
+/// half-space has a colour.
+fn coefficients(extinction: &AbsorptionDesc, scatter: &ext::VolumeScatter) -> [[f32; 3]; 2] {
+    let color = scatter.multiscatter_color.map(|c| if c.is_nan() { 0.0 } else { c.clamp(0.0, 1.0) });
+    // The extension's formula is that of isotropic scattering, whatever the anisotropy.
+    let unit = Subsurface { radius: Rgb::WHITE, anisotropy: 0.0 }.medium(color.into(), 0.0);
+    let extinction = extinction.color.map(|c| -c.ln() / extinction.distance);
+    [unit.absorption, unit.scattering].map(|share| {
+        let share = share.to_array();
+        [0, 1, 2].map(|i| share[i] * extinction[i])
+    })
 }

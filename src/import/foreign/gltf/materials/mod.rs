@@ -219,6 +219,7 @@ impl<'a> Builder<'a, '_> {
         self.sheen(&mut desc)?;
         self.anisotropy(&mut desc, roughness)?;
         self.iridescence();
+        self.walk_below(&mut desc)?;
         self.transmission(desc).map(Some)
     }
 

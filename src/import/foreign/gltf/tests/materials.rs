@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::desc::{
-    ChannelDesc, ColorDesc, ColorSpaceDesc, OpacityDesc, RangedDesc, RoughnessDesc, ScalarDesc, TextureDesc,
+    ChannelDesc, ColorDesc, ColorSpaceDesc, OpacityDesc, PhaseDesc, RangedDesc, RoughnessDesc, ScalarDesc,
+    SubsurfaceMethodDesc, TextureDesc,
 };
 use crate::desc::{TextureFilterDesc, WrapDesc, WrapModeDesc};
 
@@ -257,6 +258,51 @@ fn glass_is_thin_without_a_thickness_and_a_medium_where_it_absorbs() {
     assert_eq!((absorption.color, absorption.distance), ([0.5, 1e-4, 1.0], 2.0));
     assert!(matches!(medium.roughness, Some(RoughnessDesc::Isotropic(0.25))));
     assert_eq!(outcome(&tinted, "KHR_materials_volume"), Some(Outcome::Mapped));
+}
+
+#[test]
+fn what_scatters_within_glass_is_its_medium() {
+    // The albedo of a single scattering by the extension's formula.
+    let single = |c: f64| 1.0 - (4.09712 + 4.20863 * c - (9.59217 + 41.6808 * c + 17.7126 * c * c).sqrt()).powi(2);
+    let colors = [0.8, 0.3, 1.0];
+    let body = |more: Value| {
+        let mut extensions = json!({
+            "KHR_materials_volume": {
+                "thicknessFactor": 1, "attenuationDistance": 0.5, "attenuationColor": [0.5, 0.25, 0.9]
+            },
+            "KHR_materials_volume_scatter": { "multiscatterColor": colors, "scatterAnisotropy": 0.5 }
+        });
+        extensions.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        look_of(json!({ "pbrMetallicRoughness": { "metallicFactor": 0 }, "extensions": extensions }))
+    };
+    let milk = body(json!({ "KHR_materials_transmission": { "transmissionFactor": 1 } }));
+    let MaterialDesc::Dielectric(glass) = &milk.desc.materials["m"] else { panic!() };
+    assert!(glass.absorption.is_none());
+    let medium = &milk.desc.media[glass.medium.as_ref().unwrap()];
+    assert!(matches!(medium.phase, PhaseDesc::HenyeyGreenstein { g: 0.5 }));
+    let extinction = [0.5f64, 0.25, 0.9].map(|c| -c.ln() / 0.5);
+    for channel in 0..3 {
+        let [absorption, scattering] = [medium.absorption, medium.scattering].map(|c| f64::from(c.to_array()[channel]));
+        assert!(((absorption + scattering) / extinction[channel] - 1.0).abs() < 1e-5, "{channel}: {medium:?}");
+        assert!((scattering / extinction[channel] - single(colors[channel])).abs() < 1e-4, "{channel}: {medium:?}");
+    }
+    assert_eq!(outcome(&milk, "KHR_materials_volume_scatter"), Some(Outcome::Mapped));
+
+    let wax = body(json!({ "KHR_materials_diffuse_transmission": { "diffuseTransmissionFactor": 0.75 } }));
+    let desc = principled(&wax, "m");
+    assert_eq!((constant(&desc.subsurface), desc.subsurface_anisotropy), (0.75, Some(0.5)));
+    assert!(matches!(desc.subsurface_method, SubsurfaceMethodDesc::RandomWalk));
+    assert!(matches!(desc.base_color, ColorDesc::Rgb([0.8, 0.3, 1.0])));
+    let radii = desc.subsurface_radius.unwrap().to_array();
+    for channel in 0..3 {
+        let reduced = extinction[channel] * (1.0 - 0.5 * single(colors[channel]));
+        assert!((f64::from(radii[channel]) * reduced - 1.0).abs() < 1e-4, "{channel}: {radii:?}");
+    }
+    assert_eq!(outcome(&wax, "KHR_materials_diffuse_transmission"), Some(Outcome::Approximated));
+
+    let opaque = body(json!({}));
+    assert!(opaque.desc.media.is_empty() && principled(&opaque, "m").subsurface_radius.is_none());
+    assert_eq!(outcome(&opaque, "KHR_materials_volume_scatter"), Some(Outcome::Ignored));
 }
 
 #[test]

@@ -297,6 +297,45 @@ fn textured_meshes_without_uv_get_pbrts() {
 }
 
 #[test]
+fn a_goniometric_light_has_a_profile() {
+    // Bright in the middle, which is the image's z: the light's y, here turned towards z.
+    let is_bright = |i: usize| (16..48).contains(&(i % 64)) && (16..48).contains(&(i / 64));
+    let pixels: Vec<u8> = (0..64 * 64).map(|i| if is_bright(i) { 255 } else { 0 }).collect();
+    let mut png = std::io::Cursor::new(Vec::new());
+    image::write_buffer_with_format(&mut png, &pixels, 64, 64, image::ColorType::L8, image::ImageFormat::Png).unwrap();
+    let found = read_with(
+        "WorldBegin Translate 1 2 3 Rotate 90 1 0 0 LightSource \"goniometric\" \"string filename\" \"lamp.png\" \
+         \"rgb I\" [1 2 3] \"float power\" 5",
+        &[("lamp.png", png.get_ref())],
+    )
+    .unwrap();
+    let LightDesc::Ies(ies) = &found.desc.lights[0] else { panic!("{:?}", found.desc.lights) };
+    assert!(ies.look_at.is_none() && ies.rotation_degrees == 0.0);
+    let profile = &found.assets.profiles[&ies.file];
+    let at = |towards: DVec3| {
+        let (theta, phi) = ((-towards.y).acos().to_degrees(), (-towards.z).atan2(towards.x).to_degrees());
+        let nearest = |angles: &[f32], angle: f64| {
+            let distance = |i: &usize| (f64::from(angles[*i]) - angle.rem_euclid(360.0)).abs();
+            (0..angles.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap()
+        };
+        let column = nearest(&profile.horizontal, phi) * profile.vertical.len();
+        profile.candela[column + nearest(&profile.vertical, theta)]
+    };
+    for (direction, expected) in [
+        (DVec3::Z, 1.0),
+        (DVec3::new(0.3, 0.3, 0.9), 1.0),
+        (DVec3::NEG_Z, 0.0),
+        (DVec3::X, 0.0),
+        (DVec3::Y, 0.0),
+        (DVec3::NEG_Y, 0.0),
+    ] {
+        assert_eq!(at(direction.normalize()), expected, "{direction}");
+    }
+    // A quarter of all directions is bright.
+    assert!((ies.intensity[0] * std::f32::consts::PI / 5.0 - 1.0).abs() < 1e-5, "{ies:?}");
+}
+
+#[test]
 fn a_projection_is_a_projector() {
     // Twice as wide as high: the angle is that from the lower to the upper edge.
     let mut png = std::io::Cursor::new(Vec::new());

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::desc::{BorderDesc, MaterialDesc, PhaseDesc, VolumeDesc};
+use crate::spectrum::Spectrum;
 
 const SMOKE: &str = r#"MakeNamedMedium "smoke" "string type" "homogeneous" "rgb sigma_a" [1 2 3]
     "rgb sigma_s" [4 5 6] "float scale" 0.5 "float g" 0.25
@@ -74,6 +75,16 @@ fn grids_become_volumes() {
     assert!(!volume.transform.is_empty());
     assert_eq!(found.assets.volumes[file(&volume.density)].values, [0.5, 7.0]);
     assert_eq!(found.assets.volumes[file(&volume.emission)].values, [3.0, 4.0]);
+    // Of 2,000 K (and 50 K, which is dark): half of Planck's law over its largest value.
+    let found = grid(
+        r#""uniformgrid" "float density" [1 1] "float temperature" [1050 75] "float temperatureoffset" 50 "float temperaturescale" 2 "float Lescale" 0.5"#,
+    );
+    let medium = &found.desc.media["fire"];
+    assert_eq!(medium.emission.to_array(), [2.0; 3]);
+    let glow = &found.assets.volumes[file(&medium.volume.as_ref().unwrap().emission)];
+    let planck = Spectrum::Blackbody(2000.0).emission();
+    assert_eq!((glow.channels, &glow.values[3..]), (3, &[0.0; 3][..]));
+    assert!(glow.values.iter().zip(planck).all(|(found, c)| (found - 0.5 * c).abs() < 1e-6 && c > 0.0), "{glow:?}");
     let found = grid(r#""rgbgrid" "rgb sigma_s" [1 2 3 4 5 6]"#);
     let volume = found.desc.media["fire"].volume.as_ref().unwrap();
     let scattering = &found.assets.volumes[file(&volume.scattering)];
@@ -88,6 +99,7 @@ fn malformed_grids_are_refused() {
         (r#""uniformgrid" "integer nx" -2 "float density" [1]"#, "above 0"),
         (r#""uniformgrid" "integer nx" 100000 "float density" [1]"#, "16384"),
         (r#""uniformgrid" "integer nx" 1"#, "density"),
+        (r#""uniformgrid" "float density" 1 "float temperature" 9 "float Lescale" [1 2]"#, "as many as"),
         (r#""rgbgrid" "integer nx" 1"#, "sigma_a"),
         (r#""rgbgrid" "rgb sigma_a" [1 2]"#, "left over"),
     ] {

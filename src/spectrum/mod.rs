@@ -101,12 +101,6 @@ impl Spectrum {
         if xyz[1] > 0.0 { rgb_from_xyz(xyz.map(|x| x / xyz[1])).map(|x| x as f32) } else { [0.0; 3] }
     }
 
-    /// The mean over the visible wavelengths, weighted as the eye weights them: for numbers such as an index of
-    /// refraction.
-    pub fn mean(&self) -> f64 {
-        self.xyz()[1]
-    }
-
     /// Where straight lines meet, within the range of the observer; the spectrum is zero outside of them.
     fn knots(&self) -> Vec<f64> {
         let (first, last) = match self {
