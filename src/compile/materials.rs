@@ -82,8 +82,7 @@ impl MaterialTable {
                 }
             }
         }
-        let around = media.around(files, desc)?;
-        let within = Media::new(table.medium_of.values().copied(), around);
+        let within = Media::new(table.medium_of.values().copied(), media.around(files, desc)?);
         table.media_names = within.iter().map(|medium| media.name_of(medium).map(str::to_owned)).collect();
         table.media = within.with_volumes(media.volumes);
         table.textures = textures;

@@ -18,8 +18,8 @@ const NONE: u32 = u32::MAX;
 /// - Its asset is the object that the outermost instance places, else the file that the shape comes from, else the
 ///   shape.
 ///
-/// A medium is its own object, material and asset. What else has no name is called after its kind, its file or its object, with the place in its list: `sphere_3`,
-/// `bunny_0`, `tree_17`.
+/// A medium is its own object, material and asset. What else has no name is called after its kind, its file or its
+/// object, with the place in its list: `sphere_3`, `bunny_0`, `tree_17`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identities {
     names: Vec<Box<str>>,

@@ -245,17 +245,7 @@ impl Builder<'_, '_> {
         if abbe.is_some() {
             self.mapped(DISPERSION);
         }
-        let medium = scatter.map(|scatter| {
-            self.mapped(VOLUME_SCATTER);
-            let [absorption, scattering] = absorption.take().map_or([[0.0; 3]; 2], |a| coefficients(&a, scatter));
-            let medium = MediumDesc {
-                absorption: CoefficientDesc::Rgb(absorption),
-                scattering: CoefficientDesc::Rgb(scattering),
-                phase: PhaseDesc::HenyeyGreenstein { g: scatter.anisotropy() },
-                ..MediumDesc::default()
-            };
-            self.draft.add_medium(&self.name, &self.path, medium)
-        });
+        let medium = scatter.map(|scatter| self.medium_within(absorption.take(), scatter));
         let roughness = match desc.roughness {
             ScalarDesc::Constant(0.0) => None,
             ScalarDesc::Constant(roughness) => Some(RoughnessDesc::Isotropic(roughness)),
@@ -274,6 +264,20 @@ impl Builder<'_, '_> {
             medium,
             abbe: abbe.map(|abbe| abbe.clamp(1.0, 1000.0)),
         }))
+    }
+
+    /// Adds what scatters within glass, by its extinction; the result is its name.
+    fn medium_within(&mut self, extinction: Option<AbsorptionDesc>, scatter: &ext::VolumeScatter) -> String {
+        self.mapped(VOLUME_SCATTER);
+        let [absorption, scattering] =
+            extinction.map_or([[0.0; 3]; 2], |extinction| coefficients(&extinction, scatter));
+        let medium = MediumDesc {
+            absorption: CoefficientDesc::Rgb(absorption),
+            scattering: CoefficientDesc::Rgb(scattering),
+            phase: PhaseDesc::HenyeyGreenstein { g: scatter.anisotropy() },
+            ..MediumDesc::default()
+        };
+        self.draft.add_medium(&self.name, &self.path, medium)
     }
 
     /// Adds the material with its clear coat; the result is its name.

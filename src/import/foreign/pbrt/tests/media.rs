@@ -77,7 +77,8 @@ fn grids_become_volumes() {
     assert_eq!(found.assets.volumes[file(&volume.emission)].values, [3.0, 4.0]);
     // Of 2,000 K (and 50 K, which is dark): half of Planck's law over its largest value.
     let found = grid(
-        r#""uniformgrid" "float density" [1 1] "float temperature" [1050 75] "float temperatureoffset" 50 "float temperaturescale" 2 "float Lescale" 0.5"#,
+        r#""uniformgrid" "float density" [1 1] "float temperature" [1050 75] "float temperatureoffset" 50
+            "float temperaturescale" 2 "float Lescale" 0.5"#,
     );
     let medium = &found.desc.media["fire"];
     assert_eq!(medium.emission.to_array(), [2.0; 3]);
