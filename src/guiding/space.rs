@@ -37,7 +37,7 @@ impl Node {
 pub struct TreePoint {
     /// The tree.
     pub root: u32,
-    /// The divisions that lead to the point, the first in the highest of [`MAX_DEPTH`] bits.
+    /// The divisions that lead to the point, the first in the highest of 48 bits.
     pub path: u64,
 }
 
