@@ -36,7 +36,7 @@ pub fn ies_bytes(data: &IesData) -> Vec<u8> {
     let counts = format!("{} {}", vertical.len(), horizontal.len());
     let mut text = format!("IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 {counts} 1 2 0 0 0\n1 1 0\n");
     for row in [vertical, horizontal].into_iter().map(Vec::as_slice).chain(candela.chunks(vertical.len().max(1))) {
-        // Lines of at most 256 letters, as the standard asks for.
+        // Lines of at most 256 letters, as the standard requires.
         for line in row.chunks(16) {
             let numbers: Vec<String> = line.iter().map(|number| format!("{number:e}")).collect();
             text.push_str(&numbers.join(" "));

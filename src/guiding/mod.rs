@@ -181,19 +181,19 @@ impl Guide {
 
     /// What is known of the light at a surface whose normal, on the side of the path, is `n`; `None` if nothing.
     pub fn at(&self, p: Vec3, n: Vec3) -> Option<GuideRegion<'_>> {
-        self.region(self.find_region(self.place(p, n)))
+        self.region(self.find_region(self.tree_point(p, n)))
     }
 
     /// Where a surface is in the trees over space.
     #[inline(always)]
-    pub fn place(&self, p: Vec3, n: Vec3) -> TreePoint {
+    pub fn tree_point(&self, p: Vec3, n: Vec3) -> TreePoint {
         TreePoint::new(root(n), self.normalized(p))
     }
 
     /// The number of the [region](Self::region) around a surface; it is being loaded then.
     #[inline]
-    pub fn find_region(&self, place: TreePoint) -> u32 {
-        let region = self.trees.find(place);
+    pub fn find_region(&self, point: TreePoint) -> u32 {
+        let region = self.trees.find(point);
         prefetch(&self.learned, region);
         region as u32
     }

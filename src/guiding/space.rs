@@ -74,7 +74,7 @@ impl SpaceTrees {
         Self::of_nodes((0..ROOTS).map(Node::of_leaf).collect())
     }
 
-    /// Of the nodes of sound trees.
+    /// From the nodes of binary trees: every child after its parent, every leaf once, at most [`MAX_DEPTH`] divisions.
     pub fn of_nodes(nodes: Vec<Node>) -> Self {
         let (mut depths, mut leaf_depths) = (vec![0; nodes.len()], vec![0; nodes.len()]);
         for (index, node) in nodes.iter().enumerate() {
@@ -90,6 +90,7 @@ impl SpaceTrees {
         Self { nodes, tables, depths: leaf_depths }
     }
 
+    /// The nodes that [`of_nodes`](Self::of_nodes) takes.
     pub fn nodes(&self) -> &[Node] {
         &self.nodes
     }
@@ -102,15 +103,15 @@ impl SpaceTrees {
 
     /// The leaf around a point.
     #[inline(always)]
-    pub fn find(&self, place: TreePoint) -> usize {
+    pub fn find(&self, point: TreePoint) -> usize {
         let mut left = MAX_DEPTH - ROOT_DIVISIONS;
-        let mut entry = self.tables[(place.root as usize) << ROOT_DIVISIONS | (place.path >> left) as usize];
+        let mut entry = self.tables[(point.root as usize) << ROOT_DIVISIONS | (point.path >> left) as usize];
         loop {
             if let Some(leaf) = entry.leaf() {
                 return leaf;
             }
             left -= DIVISIONS;
-            entry = self.tables[entry.0 as usize + (place.path >> left & ((1 << DIVISIONS) - 1)) as usize];
+            entry = self.tables[entry.0 as usize + (point.path >> left & ((1 << DIVISIONS) - 1)) as usize];
         }
     }
 }

@@ -85,12 +85,12 @@ pub(super) type Regions<'a> = [Option<GuideRegion<'a>>; BATCH];
 /// Finds the regions of a block's vertices. Here and below, loops begin lookups in one pass and finish them in the
 /// next: all lanes wait for memory together.
 pub(super) fn find_regions<'a>(guide: &'a Guide, vertices: &Vertices) -> Regions<'a> {
-    let mut places = [TreePoint::default(); BATCH];
-    vectorize!(find_places(guide, vertices, &mut places));
+    let mut points = [TreePoint::default(); BATCH];
+    vectorize!(find_tree_points(guide, vertices, &mut points));
     let mut numbers = [0; BATCH];
     let lanes = || (0..vertices.count.min(BATCH)).filter(|&lane| is_guided(vertices, lane));
     for lane in lanes() {
-        numbers[lane] = guide.find_region(places[lane]);
+        numbers[lane] = guide.find_region(points[lane]);
     }
     let mut regions = [None; BATCH];
     for lane in lanes() {
@@ -103,9 +103,9 @@ pub(super) fn find_regions<'a>(guide: &'a Guide, vertices: &Vertices) -> Regions
 }
 
 #[inline(always)]
-fn find_places(guide: &Guide, vertices: &Vertices, places: &mut [TreePoint; BATCH]) {
-    for (lane, place) in places.iter_mut().enumerate().take(vertices.count) {
-        *place = guide.place(vertices.points.p.get(lane).as_vec3(), vertices.facing_normal(lane));
+fn find_tree_points(guide: &Guide, vertices: &Vertices, points: &mut [TreePoint; BATCH]) {
+    for (lane, point) in points.iter_mut().enumerate().take(vertices.count) {
+        *point = guide.tree_point(vertices.points.p.get(lane).as_vec3(), vertices.facing_normal(lane));
     }
 }
 

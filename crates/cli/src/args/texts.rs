@@ -37,8 +37,8 @@ Examples:
       Statistics for scripts.
 
 Switches that a scene or a configuration file may set have an opposite, such as --no-denoise or --depth-of-field; the \
-last one
-counts. Without -o and without \"outputs\" in the scene, SCENE.exr and SCENE.png are written to the working directory.
+last one counts. Without -o and without \"outputs\" in the scene, SCENE.exr and SCENE.png are written to the working \
+directory.
 Ctrl-C finishes the samples under way and writes the picture; a second one leaves at once.";
 
 pub const RENDER_SHORT_EXAMPLES: &str = "\
