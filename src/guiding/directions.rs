@@ -16,10 +16,10 @@ use crate::math::{Vec3, vec3};
 pub const MAX_DEPTH: u32 = 8;
 
 /// Length of the curve: the number of the smallest cells.
-const CURVE: i32 = 1 << (2 * MAX_DEPTH);
+const CURVE: u32 = 1 << (2 * MAX_DEPTH);
 
 /// All of the light. The density is exactly that of the sampling, as both count in these units.
-const WHOLE: i32 = u16::MAX as i32;
+const WHOLE: u32 = u16::MAX as u32;
 
 /// Keys of a node: a cache line of them.
 const FANOUT: usize = 32;
@@ -37,7 +37,7 @@ pub struct GuideSample {
 }
 
 /// The direction of a point of the square, and density per solid angle over density per area of the square.
-#[inline]
+#[inline(always)]
 fn direction_of([u, v]: [f32; 2]) -> (Vec3, f32) {
     let (x, y) = (2.0 * u - 1.0, 2.0 * v - 1.0);
     let z = 1.0 - x.abs() - y.abs();
@@ -49,18 +49,19 @@ fn direction_of([u, v]: [f32; 2]) -> (Vec3, f32) {
 }
 
 /// The point of the square of a unit direction; inverts [`direction_of`].
-#[inline]
+#[inline(always)]
 pub fn square_of(direction: Vec3) -> ([f32; 2], f32) {
     let scale = 1.0 / (direction.x.abs() + direction.y.abs() + direction.z.abs());
     let (x, y) = (direction.x * scale, direction.y * scale);
     let (x, y) = if direction.z < 0.0 { ((1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y)) } else { (x, y) };
-    ([0.5 * x + 0.5, 0.5 * y + 0.5].map(|c| c.clamp(0.0, ONE_MINUS_EPSILON)), 0.25 * scale * scale * scale)
+    let (u, v) = (0.5 * x + 0.5, 0.5 * y + 0.5);
+    ([u.clamp(0.0, ONE_MINUS_EPSILON), v.clamp(0.0, ONE_MINUS_EPSILON)], 0.25 * scale * scale * scale)
 }
 
 /// The place on the curve of the smallest cell in this column and row.
-#[inline]
-fn curve_of([x, y]: [i32; 2]) -> i32 {
-    let spread = |x: i32| {
+#[inline(always)]
+fn curve_of([x, y]: [u32; 2]) -> u32 {
+    let spread = |x: u32| {
         let x = (x | x << 8) & 0x00ff_00ff;
         let x = (x | x << 4) & 0x0f0f_0f0f;
         let x = (x | x << 2) & 0x3333_3333;
@@ -70,9 +71,9 @@ fn curve_of([x, y]: [i32; 2]) -> i32 {
 }
 
 /// Inverts [`curve_of`].
-#[inline]
-fn column_and_row(place: i32) -> [i32; 2] {
-    let gather = |x: i32| {
+#[inline(always)]
+fn column_and_row(place: u32) -> [u32; 2] {
+    let gather = |x: u32| {
         let x = x & 0x5555_5555;
         let x = (x | x >> 1) & 0x3333_3333;
         let x = (x | x >> 2) & 0x0f0f_0f0f;
@@ -84,47 +85,116 @@ fn column_and_row(place: i32) -> [i32; 2] {
 
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-struct Keys([i16; FANOUT]);
+struct Keys([u16; FANOUT]);
 
 impl Keys {
-    /// A key, from 0 to 65,535. Keys are stored less 32,768: processors compare signed numbers.
+    /// A key, from 0 to 65,535.
     #[inline(always)]
-    fn get(&self, i: usize) -> i32 {
-        i32::from(self.0[i]) + 32_768
+    fn get(&self, i: usize) -> u32 {
+        u32::from(self.0[i])
     }
 
-    /// How many are less than a number from 0 to 65,535.
+    /// How many are less than a number from 0 to 65,535; the last is not.
     #[inline(always)]
-    fn count_below(&self, number: i32) -> usize {
-        let number = (number - 32_768) as i16;
-        self.0.iter().map(|&key| i16::from(key < number)).sum::<i16>() as usize
+    fn count_below(&self, number: u32) -> usize {
+        let number = number as u16;
+        // By bisection without branches, so that several searches overlap.
+        let mut count = 0;
+        for half in [16, 8, 4, 2, 1] {
+            count += half * usize::from(self.0[(count + half - 1) % FANOUT] < number);
+        }
+        count
     }
 }
 
 /// The two search trees of a distribution.
-mod tree {
+#[derive(Clone, Copy, Debug)]
+pub enum SearchTree {
     /// The last place on the curve of each cell.
-    pub const PLACES: usize = 0;
+    Places,
     /// The light up to the end of each cell.
-    pub const LIGHT: usize = 1;
+    Light,
 }
 
-/// A sample whose cell is being looked up.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct SampleLookup {
-    /// Of all light, what comes before it.
-    place: f64,
-    v: f32,
-    begun: usize,
+/// A direction as a place on the curve.
+#[derive(Clone, Copy, Debug)]
+pub struct CurvePoint {
+    pub place: u32,
+    /// Density per solid angle over density per area of the square.
+    pub per_angle: f32,
 }
 
-/// A density whose cell is being looked up.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct PdfLookup {
-    /// On the curve.
-    place: i32,
-    per_angle: f32,
-    begun: usize,
+impl CurvePoint {
+    /// Of a unit direction.
+    #[inline(always)]
+    pub fn of(direction: Vec3) -> Self {
+        let (at, per_angle) = square_of(direction);
+        let scale = (1 << MAX_DEPTH) as f32;
+        let [x, y] = [at[0] * scale, at[1] * scale];
+        Self { place: curve_of([x as i32 as u32, y as i32 as u32]), per_angle }
+    }
+}
+
+/// A random number as an amount of light, in units of which all light has [`WHOLE`].
+#[derive(Clone, Copy, Debug)]
+pub struct LightPoint {
+    /// Whole units, plus one: the least key of the cell.
+    pub light: u32,
+    /// And parts of one.
+    pub fraction: f32,
+}
+
+impl LightPoint {
+    /// Of a number in `[0, 1)`.
+    #[inline(always)]
+    pub fn of(u: f32) -> Self {
+        // `WHOLE` u = 65,536 u - u; the product is exact.
+        let scaled = u * (WHOLE + 1) as f32;
+        let whole = scaled as i32;
+        let rest = (scaled - whole as f32) - u;
+        let borrow = i32::from(rest < 0.0);
+        Self { light: (whole - borrow + 1) as u32, fraction: rest + borrow as f32 }
+    }
+}
+
+/// A cell of a distribution.
+#[derive(Clone, Copy, Debug)]
+pub struct Cell {
+    /// Where it starts on the curve.
+    pub start: u32,
+    /// Where it ends there.
+    pub end: u32,
+    /// The light of all cells before.
+    pub light_before: u32,
+    /// Together with its own.
+    pub light: u32,
+}
+
+impl Cell {
+    /// The whole square, without light.
+    pub const UNLIT: Self = Self { start: 0, end: CURVE, light_before: 0, light: 0 };
+
+    /// The density per area of the square.
+    #[inline(always)]
+    pub fn density(&self) -> f32 {
+        let mass = (self.light - self.light_before) as i32 as f32;
+        mass * (CURVE as f32 / WHOLE as f32) / (self.end - self.start) as i32 as f32
+    }
+
+    /// The direction of an amount of light within the cell, and another random number; and density per solid angle over
+    /// density per area of the square.
+    #[inline(always)]
+    pub fn direction(&self, at: LightPoint, v: f32) -> (Vec3, f32) {
+        let mass = (self.light - self.light_before) as i32 as f32;
+        let light = (at.light as i32 - 1 - self.light_before as i32) as f32 + at.fraction;
+        let (x, y) = ((light / mass).min(ONE_MINUS_EPSILON), v.min(ONE_MINUS_EPSILON));
+        let [column, row] = column_and_row(self.start);
+        // Cells have 4^n places, whose root is exact.
+        let side = ((self.end - self.start) as i32 as f32).sqrt();
+        let scale = 1.0 / (1 << MAX_DEPTH) as f32;
+        let (x, y) = ((column as i32 as f32 + side * x) * scale, (row as i32 as f32 + side * y) * scale);
+        direction_of([x.min(ONE_MINUS_EPSILON), y.min(ONE_MINUS_EPSILON)])
+    }
 }
 
 /// A cell of a quadtree with its light.
@@ -165,7 +235,7 @@ impl DirectionDistribution {
                 sum += cell.light;
             }
             ends.push(end);
-            limits.push(units + (sum / total * free).round().min(free) as i32);
+            limits.push(units + (sum / total * free).round().min(free) as u32);
         }
         // Sums in another order may differ in the last digit.
         let last = cells.iter().rposition(|cell| cell.light > 0.0)?;
@@ -174,14 +244,12 @@ impl DirectionDistribution {
     }
 
     /// From where each cell ends on the curve, and the light up to there.
-    fn of_keys(ends: Vec<i32>, limits: Vec<i32>) -> Self {
+    fn of_keys(ends: Vec<u32>, limits: Vec<u32>) -> Self {
         let len = ends.len();
-        let node = |keys: &[i32]| {
-            Keys(std::array::from_fn(|i| (keys.get(i).copied().unwrap_or(i32::from(u16::MAX)) - 32_768) as i16))
-        };
+        let node = |keys: &[u32]| Keys(std::array::from_fn(|i| keys.get(i).copied().unwrap_or(WHOLE) as u16));
         let keys = [ends.into_iter().map(|end| end - 1).collect::<Vec<_>>(), limits];
         let is_deep = len > FANOUT;
-        let last_keys = |keys: &[i32]| keys.chunks(FANOUT).map(|keys| keys[keys.len() - 1]).collect::<Vec<_>>();
+        let last_keys = |keys: &[u32]| keys.chunks(FANOUT).map(|keys| keys[keys.len() - 1]).collect::<Vec<_>>();
         let roots = keys.iter().filter(|_| is_deep).map(|keys| node(&last_keys(keys)));
         let leaves = (0..len)
             .step_by(FANOUT)
@@ -190,10 +258,10 @@ impl DirectionDistribution {
     }
 
     /// The first step of a search for the cell with the first key of a tree that is not below `number`: the child of
-    /// the root. What the next steps need of both trees is being loaded then.
+    /// the root. What the next step needs of both trees is being loaded then.
     #[inline(always)]
-    fn begin(&self, tree: usize, number: i32) -> usize {
-        let index = self.nodes[tree].count_below(number);
+    pub(super) fn begin(&self, tree: SearchTree, number: u32) -> usize {
+        let index = self.nodes[tree as usize].count_below(number);
         if self.len > FANOUT {
             prefetch(&self.nodes, 2 + 2 * index);
             prefetch(&self.nodes, 3 + 2 * index);
@@ -203,38 +271,42 @@ impl DirectionDistribution {
 
     /// The cell of a search that has [begun](Self::begin).
     #[inline(always)]
-    fn finish(&self, tree: usize, number: i32, begun: usize) -> usize {
-        if self.len > FANOUT { begun * FANOUT + self.nodes[2 + 2 * begun + tree].count_below(number) } else { begun }
+    pub(super) fn finish(&self, tree: SearchTree, number: u32, begun: usize) -> Cell {
+        let is_deep = self.len > FANOUT;
+        self.cell(if is_deep {
+            begun * FANOUT + self.nodes[2 + 2 * begun + tree as usize].count_below(number)
+        } else {
+            begun
+        })
     }
 
-    /// The key before a cell, if it is not the first, and its own.
+    /// The key before a cell, less than the first by one if it is the first, and its own.
     #[inline(always)]
-    fn keys(&self, tree: usize, cell: usize) -> (Option<i32>, i32) {
-        let (node, i) = (cell / FANOUT, cell % FANOUT);
+    fn keys(&self, tree: SearchTree, cell: usize) -> [i32; 2] {
+        let (node, i, tree) = (cell / FANOUT, cell % FANOUT, tree as usize);
         let is_deep = self.len > FANOUT;
         let leaf = &self.nodes[if is_deep { 2 + 2 * node + tree } else { tree }];
         let before = if i > 0 {
-            Some(leaf.get(i - 1))
+            leaf.get(i - 1) as i32
         } else if node > 0 {
-            Some(self.nodes[tree].get(node - 1))
+            self.nodes[tree].get(node - 1) as i32
         } else {
-            None
+            -1
         };
-        (before, leaf.get(i))
+        [before, leaf.get(i) as i32]
     }
 
-    /// Where a cell starts and ends on the curve.
+    /// A cell by its place in the list.
     #[inline(always)]
-    fn places(&self, cell: usize) -> [i32; 2] {
-        let (before, last) = self.keys(tree::PLACES, cell);
-        [before.map_or(0, |last| last + 1), last + 1]
-    }
-
-    /// The light before a cell, and that together with its own.
-    #[inline(always)]
-    fn light(&self, cell: usize) -> [i32; 2] {
-        let (before, light) = self.keys(tree::LIGHT, cell);
-        [before.unwrap_or(0), light]
+    fn cell(&self, index: usize) -> Cell {
+        let [before, last] = self.keys(SearchTree::Places, index);
+        let [light_before, light] = self.keys(SearchTree::Light, index);
+        Cell {
+            start: (before + 1) as u32,
+            end: (last + 1) as u32,
+            light_before: light_before.max(0) as u32,
+            light: light as u32,
+        }
     }
 
     /// Whether both are one distribution.
@@ -244,56 +316,18 @@ impl DirectionDistribution {
 
     /// A direction; `u` in `[0, 1)²`.
     #[inline]
-    pub fn sample(&self, u: [f32; 2]) -> GuideSample {
-        self.finish_sample(&self.begin_sample(u))
+    pub fn sample(&self, [u, v]: [f32; 2]) -> GuideSample {
+        let point = LightPoint::of(u);
+        let cell = self.finish(SearchTree::Light, point.light, self.begin(SearchTree::Light, point.light));
+        let (direction, per_angle) = cell.direction(point, v);
+        GuideSample { direction, pdf: cell.density() * per_angle }
     }
 
     /// The density per solid angle with which [`sample`](Self::sample) chooses a direction.
     #[inline]
     pub fn pdf(&self, direction: Vec3) -> f32 {
-        self.finish_pdf(&self.begin_pdf(direction))
-    }
-
-    /// The first step of [`sample`](Self::sample): several that have begun wait for memory together.
-    #[inline]
-    pub fn begin_sample(&self, [u, v]: [f32; 2]) -> SampleLookup {
-        let place = f64::from(u) * f64::from(WHOLE);
-        SampleLookup { place, v, begun: self.begin(tree::LIGHT, place as i32 + 1) }
-    }
-
-    /// The other steps of [`sample`](Self::sample).
-    #[inline]
-    pub fn finish_sample(&self, lookup: &SampleLookup) -> GuideSample {
-        let &SampleLookup { place, v, begun } = lookup;
-        let cell = self.finish(tree::LIGHT, place as i32 + 1, begun);
-        let [lower, upper] = self.light(cell);
-        let mass = f64::from(upper - lower);
-        let within = [((place - f64::from(lower)) / mass) as f32, v].map(|x| x.min(ONE_MINUS_EPSILON));
-        let [start, end] = self.places(cell);
-        let corner = column_and_row(start);
-        let side = (1 << ((end - start).trailing_zeros() / 2)) as f32;
-        let at = [0, 1].map(|k| {
-            let x = (corner[k] as f32 + side * within[k]) * (1.0 / (1 << MAX_DEPTH) as f32);
-            x.min(ONE_MINUS_EPSILON)
-        });
-        let (direction, per_angle) = direction_of(at);
-        GuideSample { direction, pdf: density(mass, [start, end]) * per_angle }
-    }
-
-    /// The first step of [`pdf`](Self::pdf), as [`begin_sample`](Self::begin_sample).
-    #[inline]
-    pub fn begin_pdf(&self, direction: Vec3) -> PdfLookup {
-        let (at, per_angle) = square_of(direction);
-        let place = curve_of(at.map(|x| (x * (1 << MAX_DEPTH) as f32) as i32));
-        PdfLookup { place, per_angle, begun: self.begin(tree::PLACES, place) }
-    }
-
-    /// The other steps of [`pdf`](Self::pdf).
-    #[inline]
-    pub fn finish_pdf(&self, lookup: &PdfLookup) -> f32 {
-        let cell = self.finish(tree::PLACES, lookup.place, lookup.begun);
-        let [lower, upper] = self.light(cell);
-        density(f64::from(upper - lower), self.places(cell)) * lookup.per_angle
+        let CurvePoint { place, per_angle } = CurvePoint::of(direction);
+        self.finish(SearchTree::Places, place, self.begin(SearchTree::Places, place)).density() * per_angle
     }
 
     /// Starts to load what every lookup needs.
@@ -305,24 +339,21 @@ impl DirectionDistribution {
 
     /// Writes the distribution.
     pub(super) fn write(&self, out: &mut ByteWriter) {
-        let places = (0..self.len).map(|cell| self.places(cell)[1] as u32);
-        out.integers(&places.collect::<Vec<_>>());
-        let light = (0..self.len).map(|cell| self.light(cell)[1] as u32);
-        out.integers(&light.collect::<Vec<_>>());
+        let cells = || (0..self.len).map(|cell| self.cell(cell));
+        out.integers(&cells().map(|cell| cell.end).collect::<Vec<_>>());
+        out.integers(&cells().map(|cell| cell.light).collect::<Vec<_>>());
     }
 
     /// Reads what [`write`](Self::write) gave; `None` if it is no distribution over a quadtree.
     pub(super) fn read(data: &mut ByteReader) -> Option<Self> {
-        let mut keys = || data.integers()?.into_iter().map(|key| i32::try_from(key).ok()).collect::<Option<Vec<i32>>>();
-        let (ends, limits) = (keys()?, keys()?);
+        let (ends, limits) = (data.integers()?, data.integers()?);
         let mut start = 0;
-        let is_cell = |&end: &i32| {
-            let size = end - std::mem::replace(&mut start, end);
-            let start = end - size;
-            size > 0 && size & (size - 1) == 0 && size.trailing_zeros() % 2 == 0 && start % size == 0
+        let is_cell = |&end: &u32| {
+            let Some(size) = end.checked_sub(std::mem::replace(&mut start, end)) else { return false };
+            size.is_power_of_two() && size.trailing_zeros() % 2 == 0 && (end - size) % size == 0
         };
         let is_tree = ends.iter().all(is_cell) && ends.last() == Some(&CURVE);
-        let is_cumulative = limits.is_sorted() && limits.first() >= Some(&0) && limits.last() == Some(&WHOLE);
+        let is_cumulative = limits.is_sorted() && limits.last() == Some(&WHOLE);
         let fits = ends.len() == limits.len() && ends.len() <= MAX_CELLS;
         (fits && is_tree && is_cumulative).then(|| Self::of_keys(ends, limits))
     }
@@ -336,12 +367,6 @@ impl DirectionDistribution {
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
-}
-
-/// The density per area of the square in a cell that holds `mass` between two places on the curve.
-#[inline(always)]
-fn density(mass: f64, [start, end]: [i32; 2]) -> f32 {
-    (mass * (f64::from(CURVE) / f64::from(WHOLE)) / f64::from(end - start)) as f32
 }
 
 #[cfg(test)]
@@ -369,7 +394,7 @@ mod tests {
             divide(&mut rng, 1, &mut cells);
             let Some(distribution) = DirectionDistribution::new(&cells) else { continue };
             let total: f64 = cells.iter().map(|cell| cell.light).sum();
-            let ends: Vec<i32> = cells
+            let ends: Vec<u32> = cells
                 .iter()
                 .scan(0, |end, cell| {
                     *end += CURVE >> (2 * cell.depth);
@@ -377,7 +402,7 @@ mod tests {
                 })
                 .collect();
             for _ in 0..2000 {
-                let place = rng.below(CURVE as usize) as i32;
+                let place = rng.below(CURVE as usize) as u32;
                 let [x, y] = column_and_row(place);
                 assert_eq!(curve_of([x, y]), place);
                 let center = [x, y].map(|c| (c as f32 + 0.5) / (1 << MAX_DEPTH) as f32);
@@ -402,7 +427,7 @@ mod tests {
                         Some(*sum)
                     })
                     .position(|sum| sum > f64::from(u[0]));
-                let place = curve_of(square_of(sample.direction).0.map(|x| (x * (1 << MAX_DEPTH) as f32) as i32));
+                let place = curve_of(square_of(sample.direction).0.map(|x| (x * (1 << MAX_DEPTH) as f32) as u32));
                 let found = ends.partition_point(|&end| end <= place);
                 // At borders of cells either may be found.
                 let is_near = expected.is_none_or(|cell| cell.abs_diff(found) <= 1);
@@ -420,7 +445,7 @@ mod tests {
             out.integers(limits);
             DirectionDistribution::read(&mut ByteReader::new(&out.into_bytes())).is_some()
         };
-        let (quarter, whole) = (CURVE as u32 / 4, WHOLE as u32);
+        let (quarter, whole) = (CURVE / 4, WHOLE);
         let quarters = [quarter, 2 * quarter, 3 * quarter, 4 * quarter];
         assert!(written(&quarters, &[5, 5, 9, whole]) && written(&[4 * quarter], &[whole]));
         assert!(!written(&quarters, &[5, 4, 9, whole]) && !written(&quarters, &[5, 5, 9, whole - 1]));

@@ -7,14 +7,15 @@
 //! divided, and the directions of each where the light is.
 
 mod directions;
+mod lookups;
 mod quadtree;
 mod space;
 mod state;
 #[cfg(test)]
 mod tests;
 
-pub use directions::{DirectionDistribution, GuideSample, PdfLookup, SampleLookup};
-pub use quadtree::DirectionRecords;
+pub use directions::{DirectionDistribution, GuideSample};
+pub use lookups::{DirectionLookups, Distributions, GuideSampleRows};
 pub use space::TreePoint;
 
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
@@ -22,7 +23,10 @@ use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::prefetch::prefetch;
 use crate::math::random::hash64;
+use crate::math::rows::BATCH;
 use crate::math::{Aabb, Vec3};
+use directions::square_of;
+use quadtree::{Descent, DirectionRecords};
 use space::{MAX_DEPTH, Node, SpaceTrees};
 
 /// Records of a leaf beyond which it is divided, after one sample per pixel; after `n` it is `sqrt(n)` times as many.
@@ -76,6 +80,18 @@ struct Leaf {
 }
 
 impl Leaf {
+    /// Adds light whose direction the BSDF and the guide choose with these densities.
+    fn add_gains(&self, [surface, guide]: [f32; 2], amount: f32) {
+        if !((surface + guide).is_finite() && surface + guide > 0.0) {
+            return;
+        }
+        let usual = BSDF_SAMPLING_FRACTION * surface + (1.0 - BSDF_SAMPLING_FRACTION) * guide;
+        for (sum, share) in self.gains.iter().zip(OTHER_FRACTIONS) {
+            let gain = ((share * surface + (1.0 - share) * guide) / usual).ln();
+            sum.fetch_add((amount * gain) as i64, Ordering::Relaxed);
+        }
+    }
+
     /// The best share by the records.
     fn best_share(&self) -> f32 {
         let best = self.gains.iter().zip(OTHER_FRACTIONS).max_by_key(|(gain, _)| gain.load(Ordering::Relaxed));
@@ -107,12 +123,16 @@ pub struct Record {
     pub densities: Option<[f32; 2]>,
 }
 
-/// Where a record belongs.
+/// A record on its way to the cell that it belongs to.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct RecordLeaf {
-    at: Vec3,
-    root: u32,
+struct RecordUnderWay {
     leaf: usize,
+    /// As a point of the square.
+    direction: [f32; 2],
+    /// By which parts of a cell the direction is moved.
+    jitter: [f32; 2],
+    amount: u64,
+    cell: Descent,
 }
 
 /// The learned distribution of incident radiance over a scene, and the records of the next one.
@@ -207,49 +227,53 @@ impl Guide {
     }
 
     /// Learns from light. What is not a finite number above zero counts as no light. Equal records are treated alike.
-    pub fn record(&self, record: &Record) {
-        self.record_in(&self.find_leaf(record), record);
+    pub fn record(&self, records: &[Record]) {
+        // Each step loads what the next needs: the records of a chunk wait for memory together.
+        for records in records.chunks(BATCH) {
+            let mut leaves = [0; BATCH];
+            for (record, leaf) in records.iter().zip(&mut leaves) {
+                *leaf = self.trees.find(TreePoint::new(root(record.n), self.normalized(record.p)));
+                prefetch(&self.leaves, *leaf);
+            }
+            let mut under_way = [RecordUnderWay::default(); BATCH];
+            let mut count = 0;
+            for (record, &leaf) in records.iter().zip(&leaves) {
+                if let Some(next) = self.find_leaf(record, leaf) {
+                    prefetch(&self.leaves, next.leaf);
+                    under_way[count] = next;
+                    count += 1;
+                }
+            }
+            let under_way = &mut under_way[..count];
+            under_way.iter().for_each(|record| self.leaves[record.leaf].records.prefetch());
+            self.descend(under_way);
+            for record in &mut *under_way {
+                record.cell = record.cell.jittered(record.direction, record.jitter);
+            }
+            self.descend(under_way);
+            for record in under_way {
+                self.leaves[record.leaf].records.add(&record.cell, record.amount);
+            }
+        }
     }
 
-    /// The leaf of a record; it is being loaded then.
-    #[inline]
-    pub fn find_leaf(&self, record: &Record) -> RecordLeaf {
-        let (at, root) = (self.normalized(record.p), root(record.n));
-        let leaf = self.trees.find(TreePoint::new(root, at));
-        prefetch(&self.leaves, leaf);
-        RecordLeaf { at, root, leaf }
-    }
-
-    /// Starts to load the records of a leaf.
-    #[inline]
-    pub fn prefetch_records(&self, leaf: &RecordLeaf) {
-        self.leaves[leaf.leaf].records.prefetch();
-    }
-
-    /// [`record`](Self::record) with the leaf that was found before.
-    #[inline]
-    pub fn record_in(&self, leaf: &RecordLeaf, record: &Record) {
+    /// Counts a record in the leaf around it; the result is where its light belongs, if it has any.
+    fn find_leaf(&self, record: &Record, leaf: usize) -> Option<RecordUnderWay> {
         let Record { direction, light, densities, .. } = *record;
-        let RecordLeaf { at, root, leaf } = *leaf;
         self.leaves[leaf].count.fetch_add(1, Ordering::Relaxed);
         if !(light > 0.0 && light < f32::INFINITY && direction.is_finite()) {
-            return;
+            return None;
         }
+        let at = self.normalized(record.p);
         let amount = (light * self.scale).min(LARGEST * UNITS);
+        if let Some(densities) = densities {
+            self.leaves[leaf].add_gains(densities, amount);
+        }
         // Random numbers of the record itself.
         let bits = |a: f32, b: f32| u64::from(a.to_bits()) << 32 | u64::from(b.to_bits());
         let first = hash64(bits(at.x, direction.x) ^ hash64(bits(at.y, direction.y) ^ hash64(bits(at.z, light))));
         let second = hash64(first);
         let unit = |bits: u64| (bits & 0xf_ffff) as f32 * (1.0 / 1_048_576.0);
-        if let Some([surface, guide]) =
-            densities.filter(|[surface, guide]| (surface + guide).is_finite() && surface + guide > 0.0)
-        {
-            let usual = BSDF_SAMPLING_FRACTION * surface + (1.0 - BSDF_SAMPLING_FRACTION) * guide;
-            for (sum, share) in self.leaves[leaf].gains.iter().zip(OTHER_FRACTIONS) {
-                let gain = ((share * surface + (1.0 - share) * guide) / usual).ln();
-                sum.fetch_add((amount * gain) as i64, Ordering::Relaxed);
-            }
-        }
 
         // Moved by up to half a leaf: what leaves learn does not jump at their borders then.
         let depth = self.trees.depth(leaf);
@@ -257,8 +281,28 @@ impl Guide {
         let jitter = |k: u32| size((depth + 2 - k) / 3) * (unit(first >> (20 * k)) - 0.5);
         let moved = at + Vec3::new(jitter(0), jitter(1), jitter(2));
         let is_inside = moved.min_element() >= 0.0 && moved.max_element() < 1.0;
-        let leaf = if is_inside { self.trees.find(TreePoint::new(root, moved)) } else { leaf };
-        self.leaves[leaf].records.add(direction, [unit(second), unit(second >> 32)], amount as u64);
+        let leaf = if is_inside { self.trees.find(TreePoint::new(root(record.n), moved)) } else { leaf };
+        let (direction, _) = square_of(direction);
+        let jitter = [unit(second), unit(second >> 32)];
+        Some(RecordUnderWay { leaf, direction, jitter, amount: amount as u64, cell: Descent::to(direction) })
+    }
+
+    /// Descends to the cells of all records, a step of each at a time.
+    fn descend(&self, records: &mut [RecordUnderWay]) {
+        let mut lanes: [u8; BATCH] = std::array::from_fn(|lane| lane as u8);
+        let mut count = records.len();
+        while count > 0 {
+            let mut left = 0;
+            for i in 0..count {
+                let lane = lanes[i];
+                let RecordUnderWay { leaf, cell, .. } = &mut records[usize::from(lane)];
+                if self.leaves[*leaf].records.step(cell) {
+                    lanes[left] = lane;
+                    left += 1;
+                }
+            }
+            count = left;
+        }
     }
 
     /// The guide after training with this many samples per pixel.
@@ -303,7 +347,7 @@ impl Guide {
 
     /// Nodes of all distributions.
     pub fn directional_nodes(&self) -> usize {
-        self.leaves.iter().map(|leaf| leaf.records.len()).sum()
+        self.leaves.iter().map(|leaf| leaf.records.node_count()).sum()
     }
 
     /// A point within the unit cube.

@@ -2,9 +2,8 @@
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-use super::directions::{DirectionCell, DirectionDistribution, MAX_DEPTH, square_of};
+use super::directions::{DirectionCell, DirectionDistribution, MAX_DEPTH};
 use crate::bytes::{ByteReader, ByteWriter};
-use crate::math::Vec3;
 use crate::math::prefetch::prefetch;
 
 /// A quarter that holds more than this share of a tree's light is divided.
@@ -40,12 +39,42 @@ fn is_tree(nodes: &[RecordNode]) -> bool {
     depths.len() == nodes.len()
 }
 
-/// Four quarters that light is recorded in.
+/// Four quarters that light is recorded in: a cache line.
 #[derive(Debug, Default)]
+#[repr(align(64))]
 struct RecordNode {
     sums: [AtomicU64; 4],
     counts: [AtomicU32; 4],
     children: [u32; 4],
+}
+
+/// A descent to the cell of a tree around a point.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Descent {
+    node: u32,
+    /// Of the node, in the cell.
+    quarter: usize,
+    /// Of the quarters of the node.
+    size: f32,
+    /// In the node's square.
+    at: [f32; 2],
+}
+
+impl Descent {
+    /// To a point of the square.
+    #[inline]
+    pub fn to(at: [f32; 2]) -> Self {
+        Self { node: 0, quarter: 0, size: 0.5, at }
+    }
+
+    /// To this point moved by up to half the cell that was reached: a stochastic box filter over directions. `jitter`
+    /// in `[0, 1)²`. The cell itself if that is outside of the square.
+    #[inline]
+    pub fn jittered(&self, at: [f32; 2], jitter: [f32; 2]) -> Self {
+        let moved = [0, 1].map(|k| at[k] + self.size * (jitter[k] - 0.5));
+        let is_inside = moved.iter().all(|c| (0.0..1.0).contains(c));
+        Self::to(if is_inside { moved } else { at })
+    }
 }
 
 /// What quarters hold together with all below them.
@@ -70,37 +99,32 @@ impl Default for DirectionRecords {
 }
 
 impl DirectionRecords {
-    /// Adds light from a direction, jittered (`jitter` in `[0, 1)²`) by up to half a cell: a stochastic box filter over
-    /// directions.
-    #[inline]
-    pub fn add(&self, direction: Vec3, jitter: [f32; 2], amount: u64) {
-        let (at, _) = square_of(direction);
-        let (index, which, size) = self.find(at);
-        let moved = [0, 1].map(|k| at[k] + size * (jitter[k] - 0.5));
-        let is_inside = moved.iter().all(|c| (0.0..1.0).contains(c));
-        let (index, which, _) = if is_inside { self.find(moved) } else { (index, which, size) };
-        self.nodes[index].sums[which].fetch_add(amount, Ordering::Relaxed);
-        self.nodes[index].counts[which].fetch_add(1, Ordering::Relaxed);
-    }
-
     /// Starts to load the root.
     #[inline]
     pub fn prefetch(&self) {
         prefetch(&self.nodes, 0);
     }
 
-    /// The node and the quarter of it that is the cell around a point, and the cell's size.
+    /// One step towards the cell around a point, whose node is being loaded then; `false` in the cell.
     #[inline]
-    fn find(&self, mut at: [f32; 2]) -> (usize, usize, f32) {
-        let (mut index, mut size) = (0, 0.5);
-        loop {
-            let (which, within) = quarter(at);
-            let child = self.nodes[index].children[which];
-            if child == LEAF {
-                return (index, which, size);
-            }
-            (index, at, size) = (child as usize, within, 0.5 * size);
+    pub fn step(&self, descent: &mut Descent) -> bool {
+        let (which, within) = quarter(descent.at);
+        let child = self.nodes[descent.node as usize].children[which];
+        if child == LEAF {
+            descent.quarter = which;
+            return false;
         }
+        prefetch(&self.nodes, child as usize);
+        *descent = Descent { node: child, at: within, size: 0.5 * descent.size, quarter: 0 };
+        true
+    }
+
+    /// Adds light to the cell that a descent has reached.
+    #[inline]
+    pub fn add(&self, cell: &Descent, amount: u64) {
+        let node = &self.nodes[cell.node as usize];
+        node.sums[cell.quarter].fetch_add(amount, Ordering::Relaxed);
+        node.counts[cell.quarter].fetch_add(1, Ordering::Relaxed);
     }
 
     /// What all quarters hold, by node. Children come after their parents.
@@ -216,12 +240,7 @@ impl DirectionRecords {
     }
 
     /// Nodes of the tree.
-    pub fn len(&self) -> usize {
+    pub fn node_count(&self) -> usize {
         self.nodes.len()
-    }
-
-    /// Whether there are no nodes; never so.
-    pub fn is_empty(&self) -> bool {
-        self.nodes.is_empty()
     }
 }

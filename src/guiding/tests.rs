@@ -35,7 +35,7 @@ fn taught(rounds: u32, count: usize, order: u64) -> Guide {
             .collect();
         records.sort_by_key(|r| hash64(u64::from(r.p.x.to_bits()) ^ order));
         for record in &records {
-            guide.record(record);
+            guide.record(&[*record]);
         }
         guide = guide.refined(1 << round);
     }
@@ -118,11 +118,11 @@ fn no_record_can_poison_the_guide() {
     for round in 0..4 {
         for i in 0..20_000 {
             let direction = rng.direction().as_vec3();
-            guide.record(&record(random_place(&mut rng), direction, lobes(direction)));
+            guide.record(&[record(random_place(&mut rng), direction, lobes(direction))]);
             let x = bad[i % bad.len()];
-            guide.record(&record(Vec3::new(x, 0.5, x), direction, 1.0));
-            guide.record(&Record { densities: Some([x, 1.0]), ..record(Vec3::splat(0.5), direction, x) });
-            guide.record(&record(Vec3::splat(0.5), Vec3::new(x, 0.0, 0.0) / x, 1.0));
+            guide.record(&[record(Vec3::new(x, 0.5, x), direction, 1.0)]);
+            guide.record(&[Record { densities: Some([x, 1.0]), ..record(Vec3::splat(0.5), direction, x) }]);
+            guide.record(&[record(Vec3::splat(0.5), Vec3::new(x, 0.0, 0.0) / x, 1.0)]);
         }
         guide = guide.refined(1 << round);
     }
@@ -146,7 +146,7 @@ fn no_record_can_poison_the_guide() {
         Aabb { min: Vec3::ONE, max: Vec3::ONE },
     ] {
         let guide = Guide::new(bounds, 1.0);
-        guide.record(&record(Vec3::ONE, Vec3::X, 1.0));
+        guide.record(&[record(Vec3::ONE, Vec3::X, 1.0)]);
         assert!(guide.refined(1).at(Vec3::ZERO, Vec3::Z).unwrap().directions.pdf(Vec3::X) > 0.0);
     }
 }
@@ -154,11 +154,11 @@ fn no_record_can_poison_the_guide() {
 #[test]
 fn nothing_known_is_said_and_brightness_may_come_later() {
     let guide = Guide::new(unit_box(), 0.0);
-    guide.record(&record(Vec3::splat(0.5), Vec3::X, 1.0));
+    guide.record(&[record(Vec3::splat(0.5), Vec3::X, 1.0)]);
     let mut guide = guide.refined(1);
     assert!(!guide.has_radiance_scale() && guide.at(Vec3::splat(0.5), Vec3::Z).is_none());
     guide.set_typical(1.0);
-    guide.record(&record(Vec3::splat(0.5), Vec3::X, 1.0));
+    guide.record(&[record(Vec3::splat(0.5), Vec3::X, 1.0)]);
     assert!(guide.has_radiance_scale() && guide.refined(2).at(Vec3::splat(0.5), Vec3::Z).is_some());
     assert!(guide.learns());
     guide.set_learning(false);
@@ -182,7 +182,7 @@ fn shares_follow_what_explains_the_light() {
     for (densities, expected) in [([0.01, 1.0], 0.3), ([1.0, 0.01], 0.9), ([1.0, 1.0], BSDF_SAMPLING_FRACTION)] {
         let (guide, mut rng) = (Guide::new(unit_box(), 1.0), Rng::new(1));
         for _ in 0..100 {
-            guide.record(&Record { densities: Some(densities), ..record(random_place(&mut rng), Vec3::X, 1.0) });
+            guide.record(&[Record { densities: Some(densities), ..record(random_place(&mut rng), Vec3::X, 1.0) }]);
         }
         assert_eq!(guide.refined(1).at(Vec3::splat(0.5), Vec3::Z).unwrap().bsdf_sampling_fraction, expected);
     }
@@ -211,8 +211,8 @@ fn guides_come_back_from_bytes_and_go_on_learning_alike() {
         for _ in 0..20_000 {
             let direction = rng.direction().as_vec3();
             let record = record(random_place(&mut rng), direction, lobes(direction));
-            guide.record(&record);
-            back.record(&record);
+            guide.record(&[record]);
+            back.record(&[record]);
         }
         assert!(saved(&guide.refined(40)) == saved(&back.refined(40)));
     }
@@ -243,7 +243,7 @@ fn bytes_that_are_no_guide_are_refused() {
             if let Some(region) = guide.at(p, direction) {
                 let _ = region.directions.pdf(region.directions.sample(rng.pair()).direction);
             }
-            guide.record(&Record { n: direction, ..record(p, direction, 1.0) });
+            guide.record(&[Record { n: direction, ..record(p, direction, 1.0) }]);
         }
         let _ = guide.refined(3);
     }

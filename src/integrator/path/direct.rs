@@ -3,7 +3,7 @@
 use super::Context;
 use super::block::{DirectRows, EvalRows, PointRows, VertexRows, Vertices, spawn, vertex_flags};
 use super::evals::Surfaces;
-use super::guided::{self, Regions};
+use super::guided::Regions;
 use super::terminator::{self, TerminatorRays};
 use super::wave::Wave;
 use crate::geometry::SpawnPoint;
@@ -18,7 +18,7 @@ use crate::sampling::power_heuristic;
 
 /// Samples light for the vertices of a block, and finds the shadow rays.
 pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wave, block: usize) {
-    let Wave { vertices, media, terminator_rays, light_queue, bsdf_rows, .. } = wave;
+    let Wave { vertices, media, terminator_rays, light_queue, bsdf_rows, guided, .. } = wave;
     let count = vertices.count;
     if context.scene.lights.is_empty() {
         vertices.direct.status[..count].fill(spawn::NONE);
@@ -30,7 +30,7 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
     let is_wanted = |lane: usize| lights.target[lane] != light_target::NONE;
     surfaces.eval(&lights.direction, is_wanted, bsdf_rows, light_evals);
     if let Some(regions) = regions {
-        guided::mix_scatter_pdfs(regions, vertices);
+        guided.mix_light_pdfs(regions, vertices);
     }
     let Vertices { rows, points, light_samples: lights, light_evals: evals, direct, .. } = &mut *vertices;
     let is_mis = context.config.strategy == Strategy::Mis;

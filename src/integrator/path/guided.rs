@@ -2,16 +2,18 @@
 //! records that it is learned from.
 
 use super::Context;
-use super::block::{EvalRows, Vertices, spawn, vertex_flags};
+use super::block::{EvalRows, ScatterRows, VertexRows, Vertices, spawn, vertex_flags};
 use super::evals::Surfaces;
 use super::radiance::Output;
 use super::wave::{BsdfScratch, PathRows};
 use crate::color::Rgb;
-use crate::guiding::{Guide, GuideRegion, PdfLookup, Record, RecordLeaf, TreePoint};
+use crate::guiding::{DirectionLookups, Distributions, Guide, GuideSampleRows, Record, TreePoint};
 use crate::light::light_target;
 use crate::math::float::ONE_MINUS_EPSILON;
-use crate::math::rows::{BATCH, Row, Vec3Rows};
+use crate::math::rows::{BATCH, Row, Vec3Rows, soa};
 use crate::math::vectorize::vectorize;
+use crate::math::{Frame, Vec3};
+use crate::sampling::SampleRows;
 
 /// Largest ratio of the density of a direction to that of the BSDF alone which roulette disregards.
 const MAX_PDF_RATIO: f32 = 1e6;
@@ -44,33 +46,37 @@ impl GuideVertex {
     }
 }
 
-/// The guided vertices of a wave, and how those of one block are sampled.
-pub(super) struct GuideRecorder {
-    vertices: Vec<GuideVertex>,
-    /// How many of them have their `radiance_before`.
-    marked: usize,
-    /// By vertex of the block: whether the guide has sampled the direction, the direction, and its density.
-    is_sampled: Row<bool>,
-    directions: Vec3Rows,
-    guide_pdf: Row,
-    /// For these directions.
-    evals: EvalRows,
-    /// By vertex of the block: the densities of the BSDF and of the guide.
-    densities: [Option<[f32; 2]>; BATCH],
+soa! {
+    /// How directions of a block are mixed.
+    struct MixRows {
+        /// Whether the guide has sampled the direction.
+        is_guide_sample: u32,
+        /// The direction that the BSDF has sampled, in the world.
+        bsdf_direction: Vec3,
+        /// The guide's density for it.
+        guide_pdf_of_bsdf: f32,
+        /// Whether both densities are known.
+        has_pdfs: u32,
+        /// The densities of the BSDF and of the guide for the direction that is taken.
+        bsdf_pdf: f32,
+        guide_pdf: f32,
+    }
 }
 
-impl Default for GuideRecorder {
-    fn default() -> Self {
-        Self {
-            vertices: Vec::new(),
-            marked: 0,
-            is_sampled: [false; BATCH],
-            directions: Vec3Rows::ZERO,
-            guide_pdf: [0.0; BATCH],
-            evals: EvalRows::default(),
-            densities: [None; BATCH],
-        }
-    }
+/// The guided vertices of a wave, and how those of one block are sampled.
+#[derive(Default)]
+pub(super) struct GuideRecorder {
+    vertices: Vec<GuideVertex>,
+    /// Of the vertices, at the end of the wave.
+    records: Vec<Record>,
+    /// How many of them have their `radiance_before`.
+    marked: usize,
+    lookups: DirectionLookups,
+    /// Directions that the guide has sampled.
+    samples: GuideSampleRows,
+    /// For these directions.
+    evals: EvalRows,
+    mix: MixRows,
 }
 
 /// Whether directions at a vertex may be guided: not at mirrors, nor where light crosses, for roulette must know how it
@@ -79,27 +85,45 @@ fn is_guided(vertices: &Vertices, lane: usize) -> bool {
     vertices.rows.flags[lane] & (vertex_flags::DELTA | vertex_flags::TRANSMITS | vertex_flags::MISS) == 0
 }
 
-/// The guide's region of each vertex of a block, where directions may be guided.
-pub(super) type Regions<'a> = [Option<GuideRegion<'a>>; BATCH];
+/// What the guide knows of the light at each vertex of a block, where directions may be guided.
+pub(super) struct Regions<'a> {
+    distributions: Distributions<'a>,
+    /// As in [`GuideRegion`](crate::guiding::GuideRegion); one where there is no distribution.
+    bsdf_sampling_fraction: Row,
+}
 
-/// Finds the regions of a block's vertices. Here and below, loops begin lookups in one pass and finish them in the
-/// next: all lanes wait for memory together.
-pub(super) fn find_regions<'a>(guide: &'a Guide, vertices: &Vertices) -> Regions<'a> {
-    let mut points = [TreePoint::default(); BATCH];
-    vectorize!(find_tree_points(guide, vertices, &mut points));
-    let mut numbers = [0; BATCH];
-    let lanes = || (0..vertices.count.min(BATCH)).filter(|&lane| is_guided(vertices, lane));
-    for lane in lanes() {
-        numbers[lane] = guide.find_region(points[lane]);
-    }
-    let mut regions = [None; BATCH];
-    for lane in lanes() {
-        regions[lane] = guide.region(numbers[lane]);
-        if let Some(region) = &regions[lane] {
-            region.directions.prefetch();
+impl<'a> Regions<'a> {
+    /// Finds the regions of a block's vertices. Loops begin lookups in one pass and finish them in the next: all lanes
+    /// wait for memory together.
+    pub fn find(guide: &'a Guide, vertices: &Vertices) -> Self {
+        let mut points = [TreePoint::default(); BATCH];
+        vectorize!(find_tree_points(guide, vertices, &mut points));
+        let mut numbers = [0; BATCH];
+        let lanes = || (0..vertices.count.min(BATCH)).filter(|&lane| is_guided(vertices, lane));
+        for lane in lanes() {
+            numbers[lane] = guide.find_region(points[lane]);
         }
+        let mut regions = Self { distributions: [None; BATCH], bsdf_sampling_fraction: [1.0; BATCH] };
+        for lane in lanes() {
+            if let Some(region) = guide.region(numbers[lane]) {
+                region.directions.prefetch();
+                regions.distributions[lane] = Some(region.directions);
+                regions.bsdf_sampling_fraction[lane] = region.bsdf_sampling_fraction;
+            }
+        }
+        regions
     }
-    regions
+
+    /// The distributions of the vertices that are wanted.
+    fn distributions(&self, is_wanted: impl Fn(usize) -> bool) -> Distributions<'a> {
+        let mut wanted = self.distributions;
+        for (lane, distribution) in wanted.iter_mut().enumerate() {
+            if !is_wanted(lane) {
+                *distribution = None;
+            }
+        }
+        wanted
+    }
 }
 
 #[inline(always)]
@@ -110,23 +134,9 @@ fn find_tree_points(guide: &Guide, vertices: &Vertices, points: &mut [TreePoint;
 }
 
 /// The density of a direction that the BSDF and the guide choose with these.
-#[inline]
-fn mixed(region: &GuideRegion, [bsdf, guide]: [f32; 2]) -> f32 {
-    region.bsdf_sampling_fraction * bsdf + (1.0 - region.bsdf_sampling_fraction) * guide
-}
-
-/// Replaces the densities with which scattering finds the lights' directions.
-pub(super) fn mix_scatter_pdfs(regions: &Regions, vertices: &mut Vertices) {
-    let Vertices { light_samples, light_evals, count, .. } = vertices;
-    let chosen = || (0..*count).filter_map(|lane| Some((lane, regions[lane].as_ref()?)));
-    let mut lookups = [PdfLookup::default(); BATCH];
-    for (lane, region) in chosen().filter(|&(lane, _)| light_samples.target[lane] != light_target::NONE) {
-        lookups[lane] = region.directions.begin_pdf(light_samples.direction.get(lane));
-    }
-    for (lane, region) in chosen().filter(|&(lane, _)| light_samples.target[lane] != light_target::NONE) {
-        let guide_pdf = region.directions.finish_pdf(&lookups[lane]);
-        light_evals.pdf[lane] = mixed(region, [light_evals.pdf[lane], guide_pdf]);
-    }
+#[inline(always)]
+fn mixed(bsdf_sampling_fraction: f32, bsdf_pdf: f32, guide_pdf: f32) -> f32 {
+    bsdf_sampling_fraction * bsdf_pdf + (1.0 - bsdf_sampling_fraction) * guide_pdf
 }
 
 impl GuideRecorder {
@@ -136,74 +146,39 @@ impl GuideRecorder {
         self.marked = 0;
     }
 
+    /// Replaces the densities with which scattering finds the lights' directions.
+    pub fn mix_light_pdfs(&mut self, regions: &Regions, vertices: &mut Vertices) {
+        let Vertices { light_samples, light_evals, count, .. } = vertices;
+        let distributions = regions.distributions(|lane| light_samples.target[lane] != light_target::NONE);
+        let guide_pdf = &mut self.mix.guide_pdf;
+        self.lookups.find_pdfs(&distributions, &light_samples.direction, guide_pdf, *count);
+        vectorize!(mix_pdfs(&regions.bsdf_sampling_fraction, guide_pdf, &mut light_evals.pdf));
+    }
+
     /// Chooses between the BSDF and the guide at each vertex; the number for the choice becomes one for the lobe.
     pub fn choose(&mut self, regions: &Regions, vertices: &mut Vertices) {
-        let mut lookups = [None; BATCH];
-        for (lane, region) in regions.iter().enumerate().take(vertices.count) {
-            let Some(region) = region else { continue };
-            let (u, share) = (vertices.u_bsdf.of(lane), region.bsdf_sampling_fraction);
-            if u[0] < share {
-                vertices.u_bsdf.set_first(lane, (u[0] / share).min(ONE_MINUS_EPSILON));
-            } else {
-                lookups[lane] = Some(region.directions.begin_sample([u[1], u[2]]));
-            }
+        let Vertices { u_bsdf, count, .. } = vertices;
+        let [choice, u, v, _] = u_bsdf.numbers();
+        let distributions = regions.distributions(|lane| choice[lane] >= regions.bsdf_sampling_fraction[lane]);
+        for (is_sample, distribution) in self.mix.is_guide_sample.iter_mut().zip(&distributions) {
+            *is_sample = u32::from(distribution.is_some());
         }
-        for (lane, lookup) in lookups.iter().enumerate().take(vertices.count) {
-            self.is_sampled[lane] = false;
-            let Some((lookup, region)) = lookup.as_ref().zip(regions[lane].as_ref()) else { continue };
-            let sample = region.directions.finish_sample(lookup);
-            self.is_sampled[lane] = true;
-            self.directions.set(lane, sample.direction);
-            self.guide_pdf[lane] = sample.pdf;
-        }
+        self.lookups.sample(&distributions, [u, v], &mut self.samples, *count);
+        vectorize!(rescale_choices(&regions.bsdf_sampling_fraction, u_bsdf));
     }
 
     /// Replaces the BSDF's samples by those of the guide, and all densities by those of both together.
     pub fn mix(&mut self, context: &Context, regions: &Regions, vertices: &mut Vertices, scratch: &mut BsdfScratch) {
-        let Vertices { rows, bsdfs, non_diffuse, count, .. } = &*vertices;
-        let surfaces = Surfaces { scene: context.scene, count: *count, rows, bsdfs, non_diffuse };
-        surfaces.eval(&self.directions, |lane| self.is_sampled[lane], scratch, &mut self.evals);
-        let mut lookups = [None; BATCH];
-        for (lane, region) in regions.iter().enumerate().take(vertices.count) {
-            let scatter = &vertices.scatter;
-            let is_of_bsdf = !self.is_sampled[lane] && scatter.is_valid[lane] != 0 && scatter.is_delta[lane] == 0;
-            if let (Some(region), true) = (region, is_of_bsdf) {
-                let direction = vertices.frame(lane).to_world(scatter.wi.get(lane));
-                lookups[lane] = Some(region.directions.begin_pdf(direction));
-            }
-        }
-        for (lane, region) in regions.iter().enumerate().take(vertices.count) {
-            self.densities[lane] = None;
-            let Some(region) = region else { continue };
-            if self.is_sampled[lane] {
-                let (value, bsdf_pdf) = (self.evals.value.get(lane), self.evals.pdf[lane]);
-                let densities = [bsdf_pdf, self.guide_pdf[lane]];
-                let pdf = mixed(region, densities);
-                let scatter = &mut vertices.scatter;
-                scatter.wi.set(lane, self.evals.wi.get(lane));
-                scatter.weight.set(lane, value * (1.0 / pdf));
-                scatter.pdf[lane] = pdf;
-                scatter.rr_factor[lane] = (pdf / bsdf_pdf).min(MAX_PDF_RATIO);
-                scatter.is_valid[lane] = u32::from(!value.is_black());
-                (scatter.is_delta[lane], scatter.is_transmission[lane]) = (0, 0);
-                self.densities[lane] = Some(densities);
-                continue;
-            }
-            let scatter = &mut vertices.scatter;
-            let weight = scatter.weight.get(lane);
-            if let Some(lookup) = &lookups[lane] {
-                let densities = [scatter.pdf[lane], region.directions.finish_pdf(lookup)];
-                let pdf = mixed(region, densities);
-                let ratio = pdf / scatter.pdf[lane];
-                scatter.weight.set(lane, weight * (1.0 / ratio));
-                scatter.pdf[lane] = pdf;
-                scatter.rr_factor[lane] *= ratio.min(MAX_PDF_RATIO);
-                self.densities[lane] = Some(densities);
-            } else if scatter.is_valid[lane] != 0 {
-                scatter.weight.set(lane, weight * (1.0 / region.bsdf_sampling_fraction));
-                scatter.rr_factor[lane] *= region.bsdf_sampling_fraction;
-            }
-        }
+        let Self { lookups, samples, evals, mix, .. } = self;
+        let Vertices { rows, bsdfs, non_diffuse, scatter, count, .. } = vertices;
+        let count = *count;
+        let surfaces = Surfaces { scene: context.scene, count, rows, bsdfs, non_diffuse };
+        surfaces.eval(&samples.direction, |lane| mix.is_guide_sample[lane] != 0, scratch, evals);
+        vectorize!(find_bsdf_directions(rows, scatter, &mut mix.bsdf_direction, count));
+        let is_of_bsdf = |i: usize| mix.is_guide_sample[i] == 0 && scatter.is_valid[i] != 0 && scatter.is_delta[i] == 0;
+        let distributions = regions.distributions(is_of_bsdf);
+        lookups.find_pdfs(&distributions, &mix.bsdf_direction, &mut mix.guide_pdf_of_bsdf, count);
+        vectorize!(mix_samples(&regions.bsdf_sampling_fraction, samples, evals, mix, scatter, count));
     }
 
     /// Records the directions of the paths that go on.
@@ -220,7 +195,7 @@ impl GuideRecorder {
                 n: vertices.facing_normal(lane),
                 direction: scatter.direction.get(lane),
                 light: 0.0,
-                densities: self.densities[lane],
+                densities: (self.mix.has_pdfs[lane] != 0).then(|| [self.mix.bsdf_pdf[lane], self.mix.guide_pdf[lane]]),
             };
             let weight = scatter.weight.get(lane);
             let throughput = vertices.rows.throughput.get(lane) * weight;
@@ -240,14 +215,70 @@ impl GuideRecorder {
     /// Records what came from all directions.
     pub fn commit(&mut self, guide: Option<&Guide>, out: &Output) {
         let Some(guide) = guide.filter(|guide| guide.learns()) else { return };
-        let mut leaves = [RecordLeaf::default(); BATCH];
-        for vertices in self.vertices.chunks_mut(BATCH) {
-            for (vertex, leaf) in vertices.iter_mut().zip(&mut leaves) {
-                vertex.record.light = vertex.scattered(out);
-                *leaf = guide.find_leaf(&vertex.record);
-            }
-            leaves[..vertices.len()].iter().for_each(|leaf| guide.prefetch_records(leaf));
-            vertices.iter().zip(&leaves).for_each(|(vertex, leaf)| guide.record_in(leaf, &vertex.record));
-        }
+        let with_light = |vertex: &GuideVertex| Record { light: vertex.scattered(out), ..vertex.record };
+        self.records.clear();
+        self.records.extend(self.vertices.iter().map(with_light));
+        guide.record(&self.records);
+    }
+}
+
+#[inline(always)]
+fn mix_pdfs(bsdf_sampling_fraction: &Row, guide_pdf: &Row, pdf: &mut Row) {
+    for i in 0..BATCH {
+        pdf[i] = mixed(bsdf_sampling_fraction[i], pdf[i], guide_pdf[i]);
+    }
+}
+
+#[inline(always)]
+fn rescale_choices(bsdf_sampling_fraction: &Row, u: &mut SampleRows) {
+    for i in 0..BATCH {
+        u.set_first(i, (u.of(i)[0] / bsdf_sampling_fraction[i]).min(ONE_MINUS_EPSILON));
+    }
+}
+
+#[inline(always)]
+fn find_bsdf_directions(rows: &VertexRows, scatter: &ScatterRows, directions: &mut Vec3Rows, count: usize) {
+    for i in 0..count.min(BATCH) {
+        let frame = Frame { x: rows.frame_x.get(i), y: rows.frame_y.get(i), z: rows.n.get(i) };
+        directions.set(i, frame.to_world(scatter.wi.get(i)));
+    }
+}
+
+#[inline(always)]
+fn mix_samples(
+    bsdf_sampling_fraction: &Row,
+    samples: &GuideSampleRows,
+    evals: &EvalRows,
+    mix: &mut MixRows,
+    scatter: &mut ScatterRows,
+    count: usize,
+) {
+    for i in 0..count.min(BATCH) {
+        let fraction = bsdf_sampling_fraction[i];
+        let is_guide_sample = mix.is_guide_sample[i] != 0;
+        let (bsdf_pdf, guide_pdf) =
+            if is_guide_sample { (evals.pdf[i], samples.pdf[i]) } else { (scatter.pdf[i], mix.guide_pdf_of_bsdf[i]) };
+        let pdf = mixed(fraction, bsdf_pdf, guide_pdf);
+        let ratio = pdf / bsdf_pdf;
+        let is_known = (fraction < 1.0) & (is_guide_sample | (scatter.is_valid[i] != 0));
+        let is_delta = !is_guide_sample & (scatter.is_delta[i] != 0);
+        // What only the BSDF samples has its fraction as density.
+        let (factor, rr_factor) =
+            if is_delta { (1.0 / fraction, fraction) } else { (1.0 / ratio, ratio.min(MAX_PDF_RATIO)) };
+        let (weight, old_rr_factor) = (scatter.weight.get(i), scatter.rr_factor[i]);
+        let guided_weight = evals.value.get(i) * (1.0 / pdf);
+        let mixed_weight = if is_guide_sample { guided_weight } else { weight * factor };
+        let mixed_rr_factor = if is_guide_sample { rr_factor } else { old_rr_factor * rr_factor };
+        scatter.weight.set(i, if is_known { mixed_weight } else { weight });
+        scatter.rr_factor[i] = if is_known { mixed_rr_factor } else { old_rr_factor };
+        let wi = if is_guide_sample { evals.wi.get(i) } else { scatter.wi.get(i) };
+        scatter.wi.set(i, wi);
+        scatter.pdf[i] = if is_known & !is_delta { pdf } else { scatter.pdf[i] };
+        let is_lit = u32::from(!evals.value.get(i).is_black());
+        scatter.is_valid[i] = if is_guide_sample { is_lit } else { scatter.is_valid[i] };
+        scatter.is_delta[i] = if is_guide_sample { 0 } else { scatter.is_delta[i] };
+        scatter.is_transmission[i] = if is_guide_sample { 0 } else { scatter.is_transmission[i] };
+        (mix.bsdf_pdf[i], mix.guide_pdf[i]) = (bsdf_pdf, guide_pdf);
+        mix.has_pdfs[i] = u32::from(is_known & !is_delta);
     }
 }

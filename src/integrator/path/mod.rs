@@ -40,6 +40,7 @@ use crate::light::MisCompensation;
 use crate::sampling::Sampler;
 use crate::scene::Scene;
 pub(super) use equiangular::SegmentVertex;
+use guided::Regions;
 use radiance::Output;
 use wave::Wave;
 
@@ -193,7 +194,7 @@ impl PathIntegrator {
                 materials::sort_by_bsdf(&mut wave.vertices);
                 vertices::build_frames(context, wave);
                 wave.draw(context);
-                let regions = guide.map(|guide| guided::find_regions(guide, &wave.vertices));
+                let regions = guide.map(|guide| Regions::find(guide, &wave.vertices));
                 direct::sample(context, regions.as_ref(), wave, block);
                 caustics::gather(context, wave, block, out);
                 scatter::sample(context, regions.as_ref(), wave, block);

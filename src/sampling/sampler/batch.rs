@@ -46,6 +46,12 @@ impl SampleRows {
         numbers
     }
 
+    /// Each of the four numbers, by sample.
+    #[inline(always)]
+    pub fn numbers(&self) -> &[[f32; BATCH]; 4] {
+        &self.0
+    }
+
     /// Replaces the first number of one sample.
     #[inline(always)]
     pub fn set_first(&mut self, i: usize, u: f32) {
