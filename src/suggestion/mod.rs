@@ -2,6 +2,7 @@
 
 mod synonyms;
 
+pub use synonyms::in_place_of_type;
 use synonyms::synonym;
 #[cfg(test)]
 pub use synonyms::targets;

@@ -67,6 +67,12 @@ pub struct Parsed {
     pub files: Vec<PathBuf>,
 }
 
+/// The folder of example scenes that a package installs with a program.
+fn installed_scenes(program: &Path) -> Option<PathBuf> {
+    let scenes = program.parent()?.parent()?.join("share/steradian/scenes");
+    scenes.is_dir().then_some(scenes)
+}
+
 /// Reads the command line, and what is to be added to it. A faulty command line ends the program with exit code 2, help
 /// with 0.
 pub fn parse() -> Result<Parsed> {
@@ -75,6 +81,9 @@ pub fn parse() -> Result<Parsed> {
     let line = with_replay(line);
     if line.len() == 1 {
         log::line(FIRST_STEPS);
+        if let Some(scenes) = std::env::current_exe().ok().and_then(|program| installed_scenes(&program)) {
+            log::line(&format!("Scenes to start with: {}", scenes.display()));
+        }
         std::process::exit(2);
     }
     let command = color(command_line(), &line);
@@ -372,6 +381,16 @@ mod tests {
         let variables = variables.iter().map(|(name, value)| (OsString::from(name), OsString::from(value)));
         let found = environment(&Options::new(&Cli::command()), variables, &mut warnings);
         (found, warnings)
+    }
+
+    #[test]
+    fn scenes_of_a_package_are_found_beside_the_program() {
+        let folder = tempfile::tempdir().unwrap();
+        let program = folder.path().join("bin/steradian");
+        assert_eq!(installed_scenes(&program), None);
+        let scenes = folder.path().join("share/steradian/scenes");
+        std::fs::create_dir_all(&scenes).unwrap();
+        assert_eq!(installed_scenes(&program), Some(scenes));
     }
 
     #[test]
