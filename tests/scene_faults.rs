@@ -67,18 +67,20 @@ fn all_faults_of_a_text_are_reported_with_the_words_of_other_programs() {
 
 #[test]
 fn lights_with_an_area_and_metals_are_found_by_their_usual_names() {
-    let scene = |light: &str, material: &str| {
-        format!(
-            "{{ \"camera\": {{}}, \"lights\": [{{ \"type\": \"{light}\" }}], \"materials\": {{ \"a\": {{ \"type\": \"{material}\" }} }} }}"
-        )
-    };
-    assert_eq!(
-        messages(&scene("area", "gold")),
-        [
-            "1:40: lights[0].type: unknown type \"area\": a shape is a light by its key `emission`",
-            "1:86: materials.a.type: unknown type \"gold\" (did you mean \"conductor\"?)",
-        ]
-    );
+    let text = r#"{
+        "camera": {},
+        "lights": [{ "type": "area" }],
+        "materials": { "a": { "type": "gold" }, "b": { "type": "diffuse", "emission": 1 } },
+        "shapes": [{ "type": "cube", "min": [0, 0, 0] }, { "type": "quad", "u": [1, 0, 0] }],
+    }"#;
+    let expected = [
+        "3:30: lights[0].type: unknown type \"area\": a shape is a light by its key `emission`",
+        "4:39: materials.a.type: unknown type \"gold\" (did you mean \"conductor\"?)",
+        "4:75: materials.b: unknown key \"emission\": a shape is a light by its key `emission`",
+        "5:38: shapes[0]: unknown key \"min\" (did you mean \"transform\"?)",
+        "5:76: shapes[1]: unknown key \"u\" (did you mean \"edge_u\"?)",
+    ];
+    assert_eq!(messages(text), expected);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 mod synonyms;
 
-pub use synonyms::in_place_of_type;
+pub use synonyms::elsewhere;
 use synonyms::synonym;
 #[cfg(test)]
 pub use synonyms::targets;

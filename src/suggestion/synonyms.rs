@@ -144,6 +144,10 @@ const SYNONYMS: &[Synonym] = &[
     ("center", &["position", "transform", "point"]),
     ("centre", &["position", "transform", "point"]),
     ("position", &["transform", "origin", "point"]),
+    ("min", &["transform"]),
+    ("max", &["transform"]),
+    ("u", &["edge_u"]),
+    ("v", &["edge_v"]),
     ("translate", &["transform"]),
     ("translation", &["transform"]),
     ("rotate", &["transform", "rotation_degrees"]),
@@ -190,6 +194,8 @@ const SYNONYMS: &[Synonym] = &[
     ("index", &["ior"]),
     ("refractiveindex", &["ior"]),
     ("material", &["metal"]),
+    ("name", &["metal"]),
+    ("preset", &["metal"]),
     ("tiling", &["scale"]),
     ("repeat", &["scale"]),
     // Metals.
@@ -207,8 +213,8 @@ const SYNONYMS: &[Synonym] = &[
     ("w", &["tungsten"]),
 ];
 
-/// Words of other programs for types that are none here, and what is written in their place.
-const NO_TYPES: &[(&str, &str)] = &[
+/// Words of other programs for what is written elsewhere, and where.
+const ELSEWHERE: &[(&str, &str)] = &[
     ("area", AREA_LIGHT),
     ("arealight", AREA_LIGHT),
     ("quadlight", AREA_LIGHT),
@@ -228,10 +234,10 @@ pub fn targets() -> impl Iterator<Item = &'static str> {
     SYNONYMS.iter().flat_map(|(_, own)| *own).copied()
 }
 
-/// What is written in place of a type of another program that is none here.
-pub fn in_place_of_type(word: &str) -> Option<&'static str> {
+/// Where that is written which a type or key of another program means.
+pub fn elsewhere(word: &str) -> Option<&'static str> {
     let plain = plain(word);
-    NO_TYPES.iter().find(|(foreign, _)| *foreign == plain).map(|(_, text)| *text)
+    ELSEWHERE.iter().find(|(foreign, _)| *foreign == plain).map(|(_, text)| *text)
 }
 
 /// Lower case without `_`, `-` and spaces.

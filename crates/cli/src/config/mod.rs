@@ -91,7 +91,7 @@ pub fn parse() -> Result<Parsed> {
         if let Some(scene) = missing_scene(&command, &line, &error) {
             log::message(Level::Error, &format!("{}: no such file", scene.display()));
         }
-        exit(&error, &line)
+        exit(error, &line)
     });
     let Some(("render", render)) = matches.subcommand() else {
         return Ok(Parsed { cli: typed(&matches, &line), warnings: Vec::new(), added: Vec::new(), files: Vec::new() });
@@ -105,7 +105,7 @@ pub fn parse() -> Result<Parsed> {
     let added: Vec<Setting> =
         settings.into_iter().filter(|setting| !given(&setting.key) && !opposed(&setting.key)).collect();
     let command = added.iter().fold(command, |command, setting| options.with_default(command, setting));
-    let matches = command.try_get_matches_from(&line).unwrap_or_else(|error| exit(&error, &line));
+    let matches = command.try_get_matches_from(&line).unwrap_or_else(|error| exit(error, &line));
     let mut cli = typed(&matches, &line);
     if let args::Command::Render(arguments) = &mut cli.command {
         // Those of the command line come later and count.
@@ -137,7 +137,11 @@ fn missing_scene(command: &Command, line: &[OsString], error: &clap::Error) -> O
 
 /// Ends the program with what is wrong with the command line, or with help. Words of the line steer neither terminals
 /// nor farms.
-fn exit(error: &clap::Error, line: &[OsString]) -> ! {
+fn exit(mut error: clap::Error, line: &[OsString]) -> ! {
+    let hint = hints::hint(&error, line);
+    if hint.is_some() {
+        hints::remove_tips(&mut error);
+    }
     let text = error.to_string();
     let harmless = message_lines(&text);
     if !error.use_stderr() {
@@ -149,7 +153,7 @@ fn exit(error: &clap::Error, line: &[OsString]) -> ! {
     } else {
         log::line(harmless.trim_end());
     }
-    if let Some(hint) = hints::hint(error, line) {
+    if let Some(hint) = hint {
         log::line(&message_lines(&format!("\n{hint}")));
     }
     std::process::exit(error.exit_code());
@@ -175,7 +179,7 @@ fn check_utf8(line: &[OsString]) -> Result<()> {
 }
 
 fn typed(matches: &ArgMatches, line: &[OsString]) -> Cli {
-    Cli::from_arg_matches(matches).unwrap_or_else(|error| exit(&error, line))
+    Cli::from_arg_matches(matches).unwrap_or_else(|error| exit(error, line))
 }
 
 /// Help and complaints about the command line follow `--color`, which is not parsed yet.
