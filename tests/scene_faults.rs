@@ -84,6 +84,16 @@ fn lights_with_an_area_and_metals_are_found_by_their_usual_names() {
 }
 
 #[test]
+fn objects_are_not_read_from_lists() {
+    let text = r#"{ "camera": {}, "film": [64, 48], "shapes": { "type": "quad", "emission": [9, 9, 9] } }"#;
+    let expected = [
+        "1:25: film: expected an object {...}, found a list of 2",
+        "1:75: shapes.emission: expected an object {...}, found a list of 3",
+    ];
+    assert_eq!(messages(text), expected);
+}
+
+#[test]
 fn files_that_are_no_scenes_are_named_by_their_kind() {
     let folder = Folder::new();
     for (name, message) in [

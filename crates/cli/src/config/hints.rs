@@ -102,9 +102,11 @@ pub fn hint(error: &clap::Error, line: &[OsString]) -> Option<String> {
     }
 }
 
-/// Removes the parser's guesses from an error that has a hint.
+/// Removes the parser's guesses, and the usage with them, from an error that has a hint.
 pub fn remove_tips(error: &mut clap::Error) {
-    for kind in [ContextKind::SuggestedArg, ContextKind::SuggestedSubcommand, ContextKind::Suggested] {
+    for kind in
+        [ContextKind::SuggestedArg, ContextKind::SuggestedSubcommand, ContextKind::Suggested, ContextKind::Usage]
+    {
         error.remove(kind);
     }
 }
