@@ -71,8 +71,8 @@ fn what_it_is(file: &Path, extension: &str) -> Option<Error> {
 /// 3), `.pbrt` (pbrt-v4), `.gltf` and `.glb` (glTF 2.0). Files that the scene names are looked up beside it.
 ///
 /// # Errors
-/// [`Error::Missing`](crate::Error::Missing) if it cannot be read, [`Error::Parse`](crate::Error::Parse) or
-/// [`Error::Scene`](crate::Error::Scene) for faults in it.
+/// [`Error::Missing`] if it cannot be read, [`Error::Parse`] or
+/// [`Error::Scene`] for faults in it.
 pub fn read_scene(path: &Path, options: &ImportOptions) -> Result<Imported> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     match extension.as_str() {
