@@ -57,6 +57,7 @@ case "${1:-render}" in
         # Without benchmarks and their dependencies, which a render does not need.
         cargo run --release --locked --package steradian-cli --no-default-features -- render scenes/gallery.json -o gallery.exr -o gallery.png
         echo "The picture: $PWD/gallery.png (for a screen) and $PWD/gallery.exr (linear, for compositing)" >&2
+        echo "The program: $PWD/target/release/steradian (./setup.sh install compiles one for this machine into ~/.cargo/bin)" >&2
         ;;
     # With the features of the Python module's dependencies, so that CI compiles the library once.
     test) cargo test --locked --workspace --exclude xtask --exclude steradian-benches ;;

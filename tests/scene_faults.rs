@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::json;
 use steradian::ErrorKind;
-use steradian::internal::import;
+use steradian::internal::import::{self, ImportOptions};
 
 use crate::util::folder::{Folder, good_scene, set};
 
@@ -62,6 +62,50 @@ fn all_faults_of_a_text_are_reported_with_the_words_of_other_programs() {
         ("{ camera: {} }", "1:3: a key must stand in double quotes"),
     ] {
         assert_eq!(messages(fault), [message], "{fault}");
+    }
+}
+
+#[test]
+fn lights_with_an_area_and_metals_are_found_by_their_usual_names() {
+    let text = r#"{
+        "camera": {},
+        "lights": [{ "type": "area" }],
+        "materials": { "a": { "type": "gold" }, "b": { "type": "diffuse", "emission": 1 } },
+        "shapes": [{ "type": "cube", "min": [0, 0, 0] }, { "type": "quad", "u": [1, 0, 0] }],
+    }"#;
+    let expected = [
+        "3:30: lights[0].type: unknown type \"area\": a shape is a light by its key `emission`",
+        "4:39: materials.a.type: unknown type \"gold\" (did you mean \"conductor\"?)",
+        "4:75: materials.b: unknown key \"emission\": a shape is a light by its key `emission`",
+        "5:38: shapes[0]: unknown key \"min\" (did you mean \"transform\"?)",
+        "5:76: shapes[1]: unknown key \"u\" (did you mean \"edge_u\"?)",
+    ];
+    assert_eq!(messages(text), expected);
+}
+
+#[test]
+fn objects_are_not_read_from_lists() {
+    let text = r#"{ "camera": {}, "film": [64, 48], "shapes": { "type": "quad", "emission": [9, 9, 9] } }"#;
+    let expected = [
+        "1:25: film: expected an object {...}, found a list of 2",
+        "1:75: shapes.emission: expected an object {...}, found a list of 3",
+    ];
+    assert_eq!(messages(text), expected);
+}
+
+#[test]
+fn files_that_are_no_scenes_are_named_by_their_kind() {
+    let folder = Folder::new();
+    for (name, message) in [
+        ("a.obj", "a mesh, not a scene: a scene names it as `file` of a shape of type `mesh`"),
+        ("a.exr", "an image, not a scene"),
+        ("a.blend", "scenes of this kind cannot be read: export it as glTF (.glb), which Blender does"),
+    ] {
+        let path = folder.path(name);
+        let read = || import::read_scene(&path, &ImportOptions::default()).err().unwrap();
+        assert_eq!(read().to_string(), format!("{}: No such file or directory", path.display()));
+        std::fs::write(&path, "v 0 0 0").unwrap();
+        assert_eq!(read().to_string(), format!("{}: {message}", path.display()));
     }
 }
 

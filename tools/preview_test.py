@@ -356,6 +356,8 @@ def main():
         print("skipped: chromium and chromedriver are needed")
         return SKIP
     program = os.path.abspath(arguments.program)
+    if arguments.pictures:
+        os.makedirs(arguments.pictures, exist_ok=True)
     browser = Browser(driver, chromium)
     status = lambda: browser.run("return $('status').textContent")
     try:

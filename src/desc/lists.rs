@@ -1,4 +1,5 @@
-//! Short forms: one entry where a list is expected, one number for all entries of a short list.
+//! Short forms: one entry where a list is expected, one number for all entries of a short list. And one that is none: a
+//! list where an object is expected.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -127,6 +128,38 @@ where
     [f32; N]: Deserialize<'de>,
 {
     Ok(Option::<Spread<N>>::deserialize(deserializer)?.map(|Spread(numbers)| numbers))
+}
+
+/// Reads the keys of an object, in braces alone: serde takes a list for the values of the keys in their order.
+pub fn object<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<T, D::Error> {
+    struct Keys<T>(PhantomData<T>);
+
+    impl<'de, T: Deserialize<'de>> Visitor<'de> for Keys<T> {
+        type Value = T;
+
+        fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+            f.write_str("a map")
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<T, A::Error> {
+            T::deserialize(MapAccessDeserializer::new(map))
+        }
+    }
+
+    deserializer.deserialize_map(Keys(PhantomData))
+}
+
+/// Reads [`object`] for a key that may be absent.
+pub fn object_option<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<Option<T>, D::Error> {
+    struct InBraces<T>(T);
+
+    impl<'de, T: Deserialize<'de>> Deserialize<'de> for InBraces<T> {
+        fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+            object(deserializer).map(Self)
+        }
+    }
+
+    Ok(Option::<InBraces<T>>::deserialize(deserializer)?.map(|InBraces(object)| object))
 }
 
 #[cfg(test)]

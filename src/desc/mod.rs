@@ -68,7 +68,7 @@ use schemars::JsonSchema;
 use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use lists::{OneOrMore, one_or_more};
+use lists::{OneOrMore, object, one_or_more};
 
 /// A scene: what to render, how, and where to write it.
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
@@ -81,15 +81,16 @@ pub struct SceneDesc {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub comment: Option<String>,
     /// Size of the picture and the pixel filter.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "object")]
     pub film: FilmDesc,
     /// The camera.
+    #[serde(deserialize_with = "object")]
     pub camera: CameraDesc,
     /// The algorithm.
     #[serde(default)]
     pub integrator: IntegratorDesc,
     /// Samples per pixel and how they are chosen.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "object")]
     pub sampler: SamplerDesc,
     /// Textures by name.
     #[serde(default, deserialize_with = "unique_names", skip_serializing_if = "BTreeMap::is_empty")]

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::curves::{CurveBasisDesc, CurveKindDesc, radius_scale};
-use super::lists::{OneOrMore, one_or_more};
+use super::lists::{OneOrMore, object_option, one_or_more};
 use super::mesh::{AttributeDesc, MeshShadingDesc, NormalWeightDesc, SmoothByDesc};
 use super::{DisplacementDesc, EmissionDesc, KeyframeDesc, SubdivisionDesc, TransformDesc};
 
@@ -38,7 +38,7 @@ macro_rules! shapes {
                 #[serde(default, skip_serializing_if = "Option::is_none")]
                 pub opacity: Option<OpacityDesc>,
                 /// Light that the shape emits.
-                #[serde(default, skip_serializing_if = "Option::is_none")]
+                #[serde(default, deserialize_with = "object_option", skip_serializing_if = "Option::is_none")]
                 pub emission: Option<EmissionDesc>,
                 /// Whether the front is the side against the shape's own normal.
                 #[serde(default, skip_serializing_if = "std::ops::Not::not")]

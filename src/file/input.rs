@@ -7,7 +7,7 @@ use std::path::Path;
 
 use rustix::fs::OFlags;
 
-use super::kind;
+use super::{in_words, kind};
 
 /// The most that is read of a stream, in bytes.
 const MAX_STREAM: u64 = 1 << 32;
@@ -18,6 +18,10 @@ const MAX_STREAM: u64 = 1 << 32;
 /// The system's, or [`io::ErrorKind::InvalidInput`] for folders, devices, pipes and sockets: reading those may wait, or
 /// go on, for ever.
 pub fn open(path: &Path) -> io::Result<Take<File>> {
+    open_regular(path).map_err(in_words)
+}
+
+fn open_regular(path: &Path) -> io::Result<Take<File>> {
     // Checked before opening, which can make a device act; and after it, in case the file was exchanged in between.
     check_regular(&std::fs::metadata(path)?)?;
     let file = File::options().read(true).custom_flags((OFlags::NONBLOCK | OFlags::NOCTTY).bits() as i32).open(path)?;
@@ -86,7 +90,7 @@ pub fn skip_mark<R: BufRead>(mut source: R) -> io::Result<R> {
 /// # Errors
 /// As [`open`], but for pipes.
 pub fn read_stream(path: &Path) -> io::Result<Vec<u8>> {
-    if !std::fs::metadata(path)?.file_type().is_fifo() {
+    if !std::fs::metadata(path).map_err(in_words)?.file_type().is_fifo() {
         return read(path);
     }
     let mut bytes = Vec::new();
@@ -134,7 +138,12 @@ mod tests {
             assert!(error.to_string().starts_with(what), "{}: {error}", path.display());
             assert_eq!(open(&path).map(|_| ()).unwrap_err().kind(), io::ErrorKind::InvalidInput);
         }
-        assert_eq!(read(&at("none")).unwrap_err().kind(), io::ErrorKind::NotFound);
+        for error in [read(&at("none")).unwrap_err(), read_stream(&at("none")).unwrap_err()] {
+            assert_eq!(
+                (error.kind(), error.to_string().as_str()),
+                (io::ErrorKind::NotFound, "No such file or directory")
+            );
+        }
         assert_eq!(read_stream(Path::new("/dev/zero")).unwrap_err().kind(), io::ErrorKind::InvalidInput);
         // Files of the kernel that wait, or never end, have no length.
         assert_eq!(read(Path::new("/proc/self/status")).unwrap(), b"");

@@ -14,6 +14,7 @@ pub use lock::{Lock, LockError};
 pub use output::{append, check_creatable, resolve, write_atomically, write_synchronized};
 
 use std::fs::FileType;
+use std::io;
 use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 
@@ -26,6 +27,18 @@ fn kind(file_type: FileType) -> &'static str {
         t if t.is_symlink() => "it is a symbolic link, not a regular file",
         _ => "it is a device, not a regular file",
     }
+}
+
+/// A message of the system without its number, ` (os error 2)`.
+fn words(message: &str) -> &str {
+    message.split_once(" (os error ").map_or(message, |(words, _)| words)
+}
+
+/// An error in words alone.
+fn in_words(error: io::Error) -> io::Error {
+    let message = error.to_string();
+    let words = words(&message);
+    if words == message { error } else { io::Error::new(error.kind(), words) }
 }
 
 /// The folder of a file.

@@ -11,7 +11,7 @@ use rustix::fs::{Access, MemfdFlags, OFlags};
 use rustix::io::Errno;
 
 use super::aside::{self, Aside};
-use super::{folder_of, kind};
+use super::{folder_of, kind, words};
 use crate::error::{Error, Result};
 
 /// Symbolic links that are followed one after the other.
@@ -209,7 +209,7 @@ fn create_aside(path: &Path, target: &Path) -> Result<Aside> {
 }
 
 fn failed(path: &Path, message: impl ToString) -> Error {
-    Error::Output { file: path.to_owned(), message: message.to_string() }
+    Error::Output { file: path.to_owned(), message: words(&message.to_string()).to_owned() }
 }
 
 #[cfg(test)]

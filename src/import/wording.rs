@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::fault::{Step, node_at};
 use super::faults::SceneFault;
-use crate::suggestion::did_you_mean;
+use crate::suggestion::{did_you_mean, elsewhere};
 
 /// What is wrong, for a fault of a scene that is valid JSON.
 pub fn describe(fault: &SceneFault, scene: &Value) -> String {
@@ -96,7 +96,11 @@ fn unknown(what: &str, message: &str) -> String {
         return format!("{head}: no keys are allowed here");
     }
     let hint = did_you_mean(given, allowed.iter().copied(), ["\"", "\""]);
-    if hint.is_empty() { format!("{head}: use one of {}", allowed.join(", ")) } else { format!("{head}{hint}") }
+    match elsewhere(given) {
+        _ if !hint.is_empty() => format!("{head}{hint}"),
+        Some(place) => format!("{head}: {place}"),
+        None => format!("{head}: use one of {}", allowed.join(", ")),
+    }
 }
 
 /// "three numbers" of a list that should have them.

@@ -2,6 +2,7 @@
 
 mod synonyms;
 
+pub use synonyms::elsewhere;
 use synonyms::synonym;
 #[cfg(test)]
 pub use synonyms::targets;

@@ -15,6 +15,13 @@ const SYNONYMS: &[Synonym] = &[
     ("metal", &["conductor", "metallic"]),
     ("metallic", &["conductor"]),
     ("roughconductor", &["conductor"]),
+    ("coatedconductor", &["coated"]),
+    ("coateddiffuse", &["plastic"]),
+    ("gold", &["conductor"]),
+    ("silver", &["conductor"]),
+    ("copper", &["conductor"]),
+    ("brass", &["conductor"]),
+    ("aluminium", &["conductor"]),
     ("roughplastic", &["plastic"]),
     ("glossy", &["plastic"]),
     ("matte", &["diffuse"]),
@@ -25,6 +32,7 @@ const SYNONYMS: &[Synonym] = &[
     ("specular", &["mirror"]),
     ("reflective", &["mirror"]),
     ("disney", &["principled"]),
+    ("principledbsdf", &["principled"]),
     ("pbr", &["principled"]),
     ("standard", &["principled"]),
     ("uber", &["principled"]),
@@ -46,6 +54,10 @@ const SYNONYMS: &[Synonym] = &[
     ("obj", &["mesh"]),
     ("ply", &["mesh"]),
     ("trianglemesh", &["mesh"]),
+    ("trimesh", &["mesh"]),
+    ("plymesh", &["mesh"]),
+    ("bilinearmesh", &["mesh"]),
+    ("model", &["mesh"]),
     ("triangle", &["mesh"]),
     ("lathe", &["revolution"]),
     ("ground", &["plane"]),
@@ -65,6 +77,10 @@ const SYNONYMS: &[Synonym] = &[
     ("distant", &["directional"]),
     ("parallel", &["directional"]),
     ("omni", &["point"]),
+    ("pointlight", &["point"]),
+    ("spotlight", &["spot"]),
+    ("directionallight", &["directional"]),
+    ("sunlight", &["directional"]),
     // Textures.
     ("bitmap", &["image"]),
     ("imagemap", &["image"]),
@@ -88,14 +104,18 @@ const SYNONYMS: &[Synonym] = &[
     ("vfov", &["vertical_fov_degrees"]),
     ("fovy", &["vertical_fov_degrees"]),
     ("yfov", &["vertical_fov_degrees"]),
+    ("verticalfov", &["vertical_fov_degrees"]),
+    ("fieldofview", &["vertical_fov_degrees"]),
     ("angle", &["vertical_fov_degrees", "cutoff_angle_degrees", "rotation_degrees"]),
     ("eye", &["position"]),
+    ("origin", &["position", "transform"]),
     ("from", &["position"]),
     ("location", &["position"]),
-    ("pos", &["position"]),
+    ("pos", &["position", "transform", "point"]),
     ("target", &["look_at"]),
     ("lookat", &["look_at"]),
     ("to", &["look_at"]),
+    ("upvector", &["up"]),
     ("at", &["look_at"]),
     ("aperture", &["radius", "lens"]),
     ("lensradius", &["radius", "lens"]),
@@ -113,11 +133,21 @@ const SYNONYMS: &[Synonym] = &[
     ("maxbounces", &["max_depth"]),
     ("background", &["lights"]),
     ("objects", &["shapes"]),
+    ("geometry", &["shapes"]),
+    ("primitives", &["shapes"]),
+    ("meshes", &["shapes"]),
+    ("emitters", &["lights"]),
+    ("bsdfs", &["materials"]),
+    ("sensor", &["camera"]),
     ("output", &["outputs"]),
     // Keys of shapes and lights.
     ("center", &["position", "transform", "point"]),
     ("centre", &["position", "transform", "point"]),
     ("position", &["transform", "origin", "point"]),
+    ("min", &["transform"]),
+    ("max", &["transform"]),
+    ("u", &["edge_u"]),
+    ("v", &["edge_v"]),
     ("translate", &["transform"]),
     ("translation", &["transform"]),
     ("rotate", &["transform", "rotation_degrees"]),
@@ -148,8 +178,8 @@ const SYNONYMS: &[Synonym] = &[
     ("image", &["file", "texture"]),
     ("direction", &["look_at"]),
     // Keys of materials.
-    ("color", &["albedo", "base_color", "reflectance", "radiance", "intensity", "irradiance", "tint"]),
-    ("colour", &["albedo", "base_color", "reflectance", "color", "radiance", "intensity", "irradiance"]),
+    ("color", &["albedo", "base_color", "reflectance", "radiance", "intensity", "irradiance", "tint", "material"]),
+    ("colour", &["albedo", "base_color", "reflectance", "color", "radiance", "intensity", "irradiance", "material"]),
     ("basecolor", &["albedo", "reflectance"]),
     ("diffuse", &["albedo", "base_color"]),
     ("diffusecolor", &["albedo", "base_color"]),
@@ -164,22 +194,39 @@ const SYNONYMS: &[Synonym] = &[
     ("index", &["ior"]),
     ("refractiveindex", &["ior"]),
     ("material", &["metal"]),
+    ("name", &["metal"]),
+    ("preset", &["metal"]),
     ("tiling", &["scale"]),
     ("repeat", &["scale"]),
     // Metals.
-    ("aluminum", &["aluminium"]),
+    ("aluminum", &["aluminium", "conductor"]),
     ("alu", &["aluminium"]),
     ("al", &["aluminium"]),
     ("ag", &["silver"]),
     ("au", &["gold"]),
     ("cu", &["copper"]),
     ("fe", &["iron"]),
-    ("steel", &["iron"]),
+    ("steel", &["iron", "conductor"]),
     ("cr", &["chromium"]),
-    ("chrome", &["chromium"]),
+    ("chrome", &["chromium", "conductor"]),
     ("ti", &["titanium"]),
     ("w", &["tungsten"]),
 ];
+
+/// Words of other programs for what is written elsewhere, and where.
+const ELSEWHERE: &[(&str, &str)] = &[
+    ("area", AREA_LIGHT),
+    ("arealight", AREA_LIGHT),
+    ("quadlight", AREA_LIGHT),
+    ("rectlight", AREA_LIGHT),
+    ("emission", AREA_LIGHT),
+    ("emissive", AREA_LIGHT),
+    ("emitter", AREA_LIGHT),
+    ("light", AREA_LIGHT),
+    ("diffuselight", AREA_LIGHT),
+];
+
+const AREA_LIGHT: &str = "a shape is a light by its key `emission`";
 
 /// All words of the scene format that a synonym leads to.
 #[cfg(test)]
@@ -187,9 +234,20 @@ pub fn targets() -> impl Iterator<Item = &'static str> {
     SYNONYMS.iter().flat_map(|(_, own)| *own).copied()
 }
 
+/// Where that is written which a type or key of another program means.
+pub fn elsewhere(word: &str) -> Option<&'static str> {
+    let plain = plain(word);
+    ELSEWHERE.iter().find(|(foreign, _)| *foreign == plain).map(|(_, text)| *text)
+}
+
+/// Lower case without `_`, `-` and spaces.
+fn plain(word: &str) -> String {
+    word.chars().filter(|c| !"_- ".contains(*c)).flat_map(char::to_lowercase).collect()
+}
+
 /// The first of the words that the scene format has in place of another program's, among those allowed here.
 pub fn synonym<'a>(word: &str, allowed: &[&'a str]) -> Option<&'a str> {
-    let plain: String = word.chars().filter(|c| !"_- ".contains(*c)).flat_map(char::to_lowercase).collect();
+    let plain = plain(word);
     SYNONYMS
         .iter()
         .filter(|(foreign, _)| *foreign == plain)

@@ -6,6 +6,7 @@ use steradian::internal::output::FileUses;
 
 use crate::args::ConvertArgs;
 use crate::log::{self, Level};
+use crate::text::counted;
 use crate::{files, scene};
 
 /// Reads a scene of any format and writes it as JSON.
@@ -20,8 +21,9 @@ pub fn run(arguments: &ConvertArgs, mut uses: FileUses) -> Result<()> {
         .try_for_each(|path| uses.write(path, "--report"))?;
     let count = convert::write_scene(&imported, &arguments.input, &arguments.output, originals, uses)?;
     if !arguments.verbosity.quiet {
-        let files = if count == 1 { "1 file".to_owned() } else { format!("{count} files") };
-        log::message(Level::Note, &format!("wrote {} and {files} beside it", arguments.output.display()));
+        let files =
+            if count == 0 { String::new() } else { format!(" and {} beside it", counted(count as u64, "file")) };
+        log::message(Level::Note, &format!("wrote {}{files}", arguments.output.display()));
     }
     Ok(())
 }

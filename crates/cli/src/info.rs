@@ -25,7 +25,7 @@ pub fn run(arguments: &InfoArgs) -> Result<()> {
     value["picture"] = picture(&settings);
     value["camera"] = camera(&imported.desc, &scene);
     value["cost"] = cost(&scene, &settings);
-    if arguments.json { text::print_json(&value) } else { text::print(&text::outline(&for_people(value))) }
+    if arguments.json { text::print_json(&value) } else { text::print(&for_people(value)) }
 }
 
 /// Size, samples and algorithm of a render without options.
@@ -76,8 +76,8 @@ fn cost(scene: &Scene, settings: &Settings) -> Value {
     })
 }
 
-/// Numbers rounded, with units.
-fn for_people(mut value: Value) -> Value {
+/// Numbers rounded, with units; what is asked for first, then what is in the scene, and what it will cost.
+fn for_people(mut value: Value) -> String {
     if let Some(map) = value.as_object_mut() {
         map.remove("geometry_bytes");
         map.retain(|_, value| !value.as_array().is_some_and(Vec::is_empty) && !value.is_null());
@@ -109,7 +109,11 @@ fn for_people(mut value: Value) -> Value {
         "geometry": scaled(number("geometry_bytes"), [" bytes", " kB", " MB", " GB"]),
         "film": scaled(number("film_bytes"), [" bytes", " kB", " MB", " GB"]),
     });
-    value
+    let [picture, camera, cost] = ["picture", "camera", "cost"].map(|key| {
+        let section = value.as_object_mut().and_then(|map| map.remove(key));
+        json!({ key: section })
+    });
+    [picture, camera, value, cost].map(|section| text::outline(&section)).join("\n")
 }
 
 fn triple(value: &Value) -> String {

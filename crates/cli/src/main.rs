@@ -124,14 +124,12 @@ fn start_threads() -> Result<()> {
 
 /// Prints the manual page of the program, or writes those of all its commands.
 fn man(folder: Option<&Path>) -> Result<()> {
-    let Some(folder) = folder else {
-        let mut page = Vec::new();
-        let rendered = clap_mangen::Man::new(args::command_line()).render(&mut page);
-        rendered.map_err(|e| Error::Internal(e.to_string()))?;
-        return text::print_as_it_is(String::from_utf8_lossy(&page).trim_end());
-    };
-    let written = std::fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(args::command_line(), folder));
-    written.map_err(|e| Error::Output { file: folder.to_owned(), message: e.to_string() })
+    let pages = manual::man_pages(args::command_line())?;
+    match (folder, pages.first()) {
+        (None, Some(page)) => text::print_as_it_is(page.text.trim_end()),
+        (None, None) => Ok(()),
+        (Some(folder), _) => manual::write(&pages, folder),
+    }
 }
 
 fn exit_code(kind: ErrorKind) -> u8 {

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use super::load_scene;
 use crate::assets::{Assets, SceneSource};
 use crate::desc::SceneDesc;
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// Options of an import beside the scene file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -54,12 +54,25 @@ impl Imported {
     }
 }
 
+/// The error for a file that is there and, by its extension, no scene.
+fn what_it_is(file: &Path, extension: &str) -> Option<Error> {
+    let message = match extension {
+        "obj" | "ply" | "stl" => "a mesh, not a scene: a scene names it as `file` of a shape of type `mesh`",
+        "exr" | "png" | "jpg" | "jpeg" | "hdr" | "tif" | "tiff" => "an image, not a scene",
+        "blend" | "fbx" | "usd" | "usda" | "usdc" | "usdz" | "dae" | "abc" | "3ds" => {
+            "scenes of this kind cannot be read: export it as glTF (.glb), which Blender does"
+        }
+        _ => return None,
+    };
+    file.is_file().then(|| Error::Malformed { file: file.into(), message: message.into() })
+}
+
 /// Reads a scene file of any kind that its extension names: `.json` (Steradian's, and any other name), `.xml` (Mitsuba
 /// 3), `.pbrt` (pbrt-v4), `.gltf` and `.glb` (glTF 2.0). Files that the scene names are looked up beside it.
 ///
 /// # Errors
-/// [`Error::Missing`](crate::Error::Missing) if it cannot be read, [`Error::Parse`](crate::Error::Parse) or
-/// [`Error::Scene`](crate::Error::Scene) for faults in it.
+/// [`Error::Missing`] if it cannot be read, [`Error::Parse`] or
+/// [`Error::Scene`] for faults in it.
 pub fn read_scene(path: &Path, options: &ImportOptions) -> Result<Imported> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     match extension.as_str() {
@@ -67,7 +80,7 @@ pub fn read_scene(path: &Path, options: &ImportOptions) -> Result<Imported> {
         "pbrt" => pbrt::read(path, options),
         "gltf" | "glb" => gltf::read(path, options),
         _ => {
-            let desc = load_scene(path)?;
+            let desc = load_scene(path).map_err(|error| what_it_is(path, &extension).unwrap_or(error))?;
             Ok(Imported {
                 desc,
                 assets: Arc::default(),

@@ -6,7 +6,9 @@ use super::{
     Curve, Curves, DotRow, Dots, Drawing, Figure, Page, Picture, Report, Section, Table, count, heat, interrupted,
     number, or_dash,
 };
-use crate::{AccelReport, Machine, Mode, NodeMap, RayKind, ScalingPoint, ScalingReport, SceneReport, Spent};
+use crate::{
+    AccelReport, BuildReport, Machine, Mode, NodeMap, RayKind, ScalingPoint, ScalingReport, SceneReport, Spent,
+};
 
 /// Everything a benchmark of accelerators has found.
 #[derive(Clone, Debug, Serialize)]
@@ -284,20 +286,23 @@ fn work(scene: &SceneReport) -> Table {
 }
 
 fn structures(scene: &SceneReport) -> Table {
+    let builds = |accel: &AccelReport, text: &dyn Fn(&BuildReport) -> String| {
+        accel.builds.iter().map(text).collect::<Vec<_>>().join(", ")
+    };
+    let threads = scene.accels.first().map_or(String::new(), |accel| builds(accel, &|b| b.threads.to_string()));
     let mut table = Table::new(
         "Builds and structures",
-        "accelerator | what it is | build ms | bytes per primitive | peak of a build, MB | nodes | leaves | depth | \
-         items per leaf | SAH cost | EPO",
+        &format!(
+            "accelerator | what it is | build ms on {threads} threads | million primitives built per second | bytes \
+             per primitive | peak of a build, MB | nodes | leaves | depth | items per leaf | SAH cost | EPO"
+        ),
     );
     for accel in &scene.accels {
-        let builds = accel
-            .builds
-            .iter()
-            .map(|b| format!("{:.1} ({} threads, {:.2} Mprims/s)", b.milliseconds[0], b.threads, b.mprims_per_second));
         let mut row = vec![
             accel.name.clone(),
             accel.description.clone(),
-            builds.collect::<Vec<_>>().join(", "),
+            builds(accel, &|b| format!("{:.1}", b.milliseconds[0])),
+            builds(accel, &|b| format!("{:.2}", b.mprims_per_second)),
             format!("{:.1}", accel.bytes as f64 / scene.primitives.max(1) as f64),
             or_dash(accel.peak_build_bytes.map(|bytes| format!("{:.1}", bytes as f64 / 1e6))),
         ];

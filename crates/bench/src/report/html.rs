@@ -101,6 +101,22 @@ fn add_list(out: &mut String, items: &[String]) {
     }
 }
 
+fn is_of_number(c: char) -> bool {
+    c.is_ascii_digit() || matches!(c, '-' | '+')
+}
+
+/// The text of a cell; the range behind a number, `1.5 (1 to 2)`, has a line of its own.
+fn value(text: &str) -> String {
+    match text.split_once(" (") {
+        Some((number, range))
+            if range.contains(" to ") && number.starts_with(is_of_number) && !number.contains(' ') =>
+        {
+            format!("{} <small>({}</small>", inline(number), inline(range))
+        }
+        _ => inline(text),
+    }
+}
+
 /// Adds a table below its title. Columns of numbers are set flush right; a cell that is a verdict has its class.
 fn add_table(out: &mut String, table: &Table) {
     let is_numeric =
@@ -123,7 +139,7 @@ fn add_table(out: &mut String, table: &Table) {
             _ => None,
         });
         let class = if class.is_empty() { String::new() } else { format!(" class=\"{}\"", class.join(" ")) };
-        format!("<{tag}{class}>{}</{tag}>", inline(text))
+        format!("<{tag}{class}>{}</{tag}>", value(text))
     };
     let cells =
         |tag: &str, row: &[String]| row.iter().enumerate().map(|(i, text)| cell(tag, i, text)).collect::<String>();
@@ -204,6 +220,9 @@ mod tests {
         let row = |cells: [&str; 3]| cells.map(str::to_owned).to_vec();
         let rows = vec![row(["passed", "-1.5 (-2 to 1)", "x"]), row(["failed", "-", "3"])];
         add_table(&mut out, &Table { rows, ..Table::new("", "verdict | value | text") });
-        assert!(out.contains("<td class=\"good\">passed</td><td class=\"n\">-1.5 (-2 to 1)</td><td>x</td>"), "{out}");
+        assert!(
+            out.contains("<td class=\"good\">passed</td><td class=\"n\">-1.5 <small>(-2 to 1)</small></td><td>x</td>"),
+            "{out}"
+        );
     }
 }

@@ -23,7 +23,7 @@ const BOLD: f64 = 7.8;
 const NAME: usize = 22;
 
 /// Characters of the name of a row.
-const NAMES: usize = 30;
+const NAMES: usize = 34;
 
 /// Colours of the first series: apart for colour-blind readers, and at least 3 : 1 in contrast with both papers.
 const COLORS: [[u8; 3]; 8] = [
@@ -319,6 +319,8 @@ pub fn dots(figure: &Dots) -> String {
             names.push(name);
         }
     });
+    // What is a way of using another, "embree, batches", has a colour after those of all others, which curves share.
+    names.sort_by_key(|name| name.contains(", "));
     let groups = figure.groups.iter().map(|(name, _)| name.as_str());
     let longest =
         names.iter().copied().chain(groups).map(|name| name.chars().count().min(NAMES)).max().unwrap_or(0) as f64;

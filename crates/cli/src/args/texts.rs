@@ -10,10 +10,11 @@ Examples:
   steradian replay scene.json 120,80 7             The values of one sample of one pixel
   steradian compare reference.exr test.exr         How far two pictures differ
 
+Scenes to start with: /usr/share/steradian/scenes where the Debian package is installed, scenes in a checkout.
+
 Exit codes: 0 done, 1 internal failure, 2 wrong usage, 3 scene invalid, 4 file missing, 5 output not writable, 6 \
-checkpoint or
-shard does not match, 33 out of memory, 130 interrupted and 143 terminated (with checkpoint and picture so far \
-written).";
+checkpoint or shard does not match, 33 out of memory, 130 interrupted and 143 terminated (with checkpoint and picture \
+so far written).";
 
 pub const RENDER_EXAMPLES: &str = "\
 Examples:

@@ -36,6 +36,20 @@ const OPTIONS: [(&str, &str); 27] = [
     ("--spectral", "unsupported: Steradian renders in linear RGB"),
 ];
 
+/// Commands of other programs, and what they are here.
+const COMMANDS: [(&str, &str); 10] = [
+    ("preview", "steradian render SCENE --preview PORT"),
+    ("display", "steradian view FILE.exr"),
+    ("show", "steradian view FILE.exr"),
+    ("open", "steradian view FILE.exr"),
+    ("diff", "steradian compare REFERENCE.exr TEST.exr"),
+    ("import", "steradian convert SCENE OUTPUT.json"),
+    ("export", "steradian convert SCENE OUTPUT.json"),
+    ("check", "steradian info SCENE"),
+    ("validate", "steradian info SCENE"),
+    ("benchmark", "steradian bench"),
+];
+
 /// Options of earlier versions: the command, the option, and what replaces it.
 const RENAMED: [(&str, &str, &str); 14] = [
     ("render", "--exr-profile", "--exr profile=NAME"),
@@ -63,6 +77,9 @@ pub fn hint(error: &clap::Error, line: &[OsString]) -> Option<String> {
     match error.kind() {
         ErrorKind::InvalidSubcommand => {
             let word = given(ContextKind::InvalidSubcommand)?;
+            if let Some((_, here)) = COMMANDS.iter().find(|(other, _)| *other == word) {
+                return Some(format!("In place of {word}: {here}"));
+            }
             let extension = Path::new(word).extension()?.to_str()?.to_lowercase();
             match extension.as_str() {
                 "json" | "xml" | "pbrt" | "gltf" | "glb" => Some(format!("To render a scene: steradian render {word}")),
@@ -85,6 +102,15 @@ pub fn hint(error: &clap::Error, line: &[OsString]) -> Option<String> {
     }
 }
 
+/// Removes the parser's guesses, and the usage with them, from an error that has a hint.
+pub fn remove_tips(error: &mut clap::Error) {
+    for kind in
+        [ContextKind::SuggestedArg, ContextKind::SuggestedSubcommand, ContextKind::Suggested, ContextKind::Usage]
+    {
+        error.remove(kind);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -100,6 +126,24 @@ mod tests {
         assert_eq!(hint_for("a/room.json").unwrap(), "To render a scene: steradian render a/room.json");
         assert!(hint_for("a.exr").unwrap().contains("rerender a.exr"));
         assert_eq!(hint_for("rendr"), None);
+    }
+
+    #[test]
+    fn commands_of_other_programs_lead_to_those_here() {
+        for (other, here) in COMMANDS {
+            assert_eq!(hint_for(other).unwrap(), format!("In place of {other}: {here}"));
+            let name = here.split(' ').nth(1).unwrap();
+            assert!(crate::args::command_line().find_subcommand(name).is_some(), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_hint_takes_the_place_of_the_parsers_guess() {
+        let error = || crate::args::command_line().try_get_matches_from(["steradian", "nofile.json"]).unwrap_err();
+        assert!(error().to_string().contains("tip"));
+        let mut without = error();
+        remove_tips(&mut without);
+        assert!(!without.to_string().contains("tip"), "{without}");
     }
 
     #[test]

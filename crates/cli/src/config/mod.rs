@@ -67,6 +67,12 @@ pub struct Parsed {
     pub files: Vec<PathBuf>,
 }
 
+/// The folder of example scenes that a package installs with a program.
+fn installed_scenes(program: &Path) -> Option<PathBuf> {
+    let scenes = program.parent()?.parent()?.join("share/steradian/scenes");
+    scenes.is_dir().then_some(scenes)
+}
+
 /// Reads the command line, and what is to be added to it. A faulty command line ends the program with exit code 2, help
 /// with 0.
 pub fn parse() -> Result<Parsed> {
@@ -75,6 +81,9 @@ pub fn parse() -> Result<Parsed> {
     let line = with_replay(line);
     if line.len() == 1 {
         log::line(FIRST_STEPS);
+        if let Some(scenes) = std::env::current_exe().ok().and_then(|program| installed_scenes(&program)) {
+            log::line(&format!("Scenes to start with: {}", scenes.display()));
+        }
         std::process::exit(2);
     }
     let command = color(command_line(), &line);
@@ -82,7 +91,7 @@ pub fn parse() -> Result<Parsed> {
         if let Some(scene) = missing_scene(&command, &line, &error) {
             log::message(Level::Error, &format!("{}: no such file", scene.display()));
         }
-        exit(&error, &line)
+        exit(error, &line)
     });
     let Some(("render", render)) = matches.subcommand() else {
         return Ok(Parsed { cli: typed(&matches, &line), warnings: Vec::new(), added: Vec::new(), files: Vec::new() });
@@ -96,7 +105,7 @@ pub fn parse() -> Result<Parsed> {
     let added: Vec<Setting> =
         settings.into_iter().filter(|setting| !given(&setting.key) && !opposed(&setting.key)).collect();
     let command = added.iter().fold(command, |command, setting| options.with_default(command, setting));
-    let matches = command.try_get_matches_from(&line).unwrap_or_else(|error| exit(&error, &line));
+    let matches = command.try_get_matches_from(&line).unwrap_or_else(|error| exit(error, &line));
     let mut cli = typed(&matches, &line);
     if let args::Command::Render(arguments) = &mut cli.command {
         // Those of the command line come later and count.
@@ -128,7 +137,11 @@ fn missing_scene(command: &Command, line: &[OsString], error: &clap::Error) -> O
 
 /// Ends the program with what is wrong with the command line, or with help. Words of the line steer neither terminals
 /// nor farms.
-fn exit(error: &clap::Error, line: &[OsString]) -> ! {
+fn exit(mut error: clap::Error, line: &[OsString]) -> ! {
+    let hint = hints::hint(&error, line);
+    if hint.is_some() {
+        hints::remove_tips(&mut error);
+    }
     let text = error.to_string();
     let harmless = message_lines(&text);
     if !error.use_stderr() {
@@ -140,7 +153,7 @@ fn exit(error: &clap::Error, line: &[OsString]) -> ! {
     } else {
         log::line(harmless.trim_end());
     }
-    if let Some(hint) = hints::hint(error, line) {
+    if let Some(hint) = hint {
         log::line(&message_lines(&format!("\n{hint}")));
     }
     std::process::exit(error.exit_code());
@@ -166,7 +179,7 @@ fn check_utf8(line: &[OsString]) -> Result<()> {
 }
 
 fn typed(matches: &ArgMatches, line: &[OsString]) -> Cli {
-    Cli::from_arg_matches(matches).unwrap_or_else(|error| exit(&error, line))
+    Cli::from_arg_matches(matches).unwrap_or_else(|error| exit(error, line))
 }
 
 /// Help and complaints about the command line follow `--color`, which is not parsed yet.
@@ -372,6 +385,16 @@ mod tests {
         let variables = variables.iter().map(|(name, value)| (OsString::from(name), OsString::from(value)));
         let found = environment(&Options::new(&Cli::command()), variables, &mut warnings);
         (found, warnings)
+    }
+
+    #[test]
+    fn scenes_of_a_package_are_found_beside_the_program() {
+        let folder = tempfile::tempdir().unwrap();
+        let program = folder.path().join("bin/steradian");
+        assert_eq!(installed_scenes(&program), None);
+        let scenes = folder.path().join("share/steradian/scenes");
+        std::fs::create_dir_all(&scenes).unwrap();
+        assert_eq!(installed_scenes(&program), Some(scenes));
     }
 
     #[test]

@@ -23,7 +23,11 @@ fn page(name: &str, text: String) -> Page {
 }
 
 fn add_pages(command: &Command, path: &str, list: &mut String, pages: &mut Vec<Page>) {
-    for command in command.get_subcommands().filter(|command| !command.is_hide_set() && command.get_name() != "help") {
+    let shown = |command: &&Command| !command.is_hide_set() && command.get_name() != "help";
+    let mut commands: Vec<&Command> = command.get_subcommands().filter(shown).collect();
+    // As in the help; options of its own may have moved it to the end.
+    commands.sort_by_key(|command| command.get_name() != "render");
+    for command in commands {
         let path = format!("{path} {}", command.get_name());
         if command.has_subcommands() {
             add_pages(command, &path, list, pages);

@@ -1,7 +1,9 @@
-//! Pages of the manual: the scene format from its JSON Schema, the command line from its definition.
+//! Pages of the manual: the scene format from its JSON Schema, the command line from its definition, for the book and
+//! for `man`.
 
 mod commands;
 mod format;
+mod man;
 mod words;
 
 use std::fs;
@@ -13,11 +15,13 @@ use steradian::{Error, Result};
 
 pub use commands::pages as command_pages;
 pub use format::pages as format_pages;
+pub use man::pages as man_pages;
 
-/// A page: the name of its file and its Markdown.
+/// A page: the name of its file and its Markdown or roff.
 pub struct Page {
     name: String,
-    text: String,
+    /// All of it.
+    pub text: String,
 }
 
 /// Writes pages into a folder, which is made if needed.
