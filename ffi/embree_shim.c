@@ -191,16 +191,26 @@ void st_set_filter(RTCGeometry triangles, const struct StFilter *filter_data) {
 /* Distances of Embree may be this part of the reach too small. */
 static const float CURVE_SLACK = 0.25f;
 
+/*
+ * A ray that starts this part of the reach or more above the tangent plane of its hit, a quarter of the largest radius, does not leave the curve there:
+ * curves bend away from the plane, and Embree's surface is closer to that of the shape.
+ */
+static const float CURVE_HEIGHT = 0.0625f;
+
 static bool curve_counts(const struct StCurves *curves, const struct RTCFilterFunctionNArguments *args, unsigned lane) {
     const unsigned n = args->N;
     const float *rays = (const float *)args->ray, *reals = (const float *)args->hit;
     struct StRay ray = ray_of_lane(rays, n, lane);
     const float *d = ray.direction;
-    const float facing = reals[NG_X * n + lane] * d[0] + reals[NG_Y * n + lane] * d[1] + reals[NG_Z * n + lane] * d[2];
+    const float g[3] = {reals[NG_X * n + lane], reals[NG_Y * n + lane], reals[NG_Z * n + lane]};
+    const float facing = g[0] * d[0] + g[1] * d[1] + g[2] * d[2];
     /* False for a NaN. */
     if (!(facing < 0.0f)) return false;
     const float length = sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
     if (ray.t_max * length > curves->reach) return true;
+    const float square = g[0] * g[0] + g[1] * g[1] + g[2] * g[2];
+    /* Not where the square underflows or, for which this is false, overflows. */
+    if (square > 1e-30f && ray.t_max * -facing > CURVE_HEIGHT * curves->reach * sqrtf(square)) return true;
     const unsigned *ids = (const unsigned *)reals;
     ray.t_max += CURVE_SLACK * curves->reach / length;
     const struct StUserPrimitives *primitives = &curves->primitives;

@@ -275,7 +275,7 @@ impl TexturedMaterial {
         match self {
             Self::Plastic { coat, .. } => coat.is_constant(),
             Self::Coated { coat, tint, .. } => coat.is_constant() && tint.texture().is_none(),
-            Self::Principled(_) => true,
+            Self::Principled(_) | Self::Hair { .. } => true,
             _ => false,
         }
     }

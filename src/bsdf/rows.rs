@@ -3,7 +3,7 @@
 use super::conductor::{MultipleScattering as MetalMultiple, Scattering, SingleScattering as Metal};
 use super::dielectric::{MultipleScattering as GlassMultiple, SingleScattering as Glass, Smooth as SmoothGlass};
 use super::plastic::{IsotropicPlastic, PlasticLayers, SmoothPlastic};
-use super::{Bsdf, BsdfEval, BsdfSample, Plastic, Principled, SingleScatteringBsdf};
+use super::{Bsdf, BsdfEval, BsdfSample, Hair, Plastic, Principled, SingleScatteringBsdf};
 use crate::color::Rgb;
 use crate::math::Vec3;
 use crate::math::rows::{BATCH, soa};
@@ -22,7 +22,7 @@ soa! {
         u: f32,
         /// two numbers.
         v: f32,
-        /// Of BSDFs that vary, the colour of the base
+        /// Of BSDFs that vary, the colour of the base, or the absorption of hair,
         color: Rgb,
         /// and the factor on what a coat reflects;
         tint: Rgb,
@@ -107,6 +107,7 @@ impl BsdfQueryRows {
             Bsdf::Plastic(plastic) => self.set_plastic(i, plastic),
             Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(plastic)) => self.set_plastic(i, plastic),
             Bsdf::Principled(principled) => principled.set_parameters(i, self),
+            Bsdf::Hair(hair) => self.color.set(i, hair.absorption()),
             _ => {}
         }
     }
@@ -168,6 +169,19 @@ impl<B: LaneBsdf, F: Fn(&Principled) -> B> LaneBsdfs for Principleds<'_, F> {
     }
 }
 
+/// Hairs that differ in absorption alone.
+struct Hairs<'a> {
+    first: &'a Hair,
+    queries: &'a BsdfQueryRows,
+}
+
+impl LaneBsdfs for Hairs<'_> {
+    #[inline(always)]
+    fn lane(&self, i: usize) -> impl LaneBsdf {
+        self.first.with_absorption(self.queries.color.get(i))
+    }
+}
+
 /// `$body` with BSDFs that are fit for vector code as `$lanes`, else `$otherwise`.
 macro_rules! lanes {
     ($bsdf:expr, $varying:expr, $lanes:ident => $body:expr, $otherwise:expr) => {{
@@ -222,14 +236,18 @@ macro_rules! lanes {
             Bsdf::SeparableGgx(SingleScatteringBsdf::Dielectric(bsdf)) if !bsdf.flags().is_delta() => {
                 with!(Uniform(Glass(bsdf)))
             }
+            Bsdf::Hair(bsdf) => match $varying {
+                None => with!(Uniform(*bsdf)),
+                Some(queries) => with!(Hairs { first: bsdf, queries }),
+            },
             _ => $otherwise,
         }
     }};
 }
 
 impl Bsdf {
-    /// Whether BSDFs of one material that are like this one, and of plastics those that differ in colours alone, can be
-    /// one group of queries.
+    /// Whether BSDFs of one material that are like this one, and of plastics and hair those that differ in colours alone,
+    /// can be one group of queries.
     pub fn can_vary(&self) -> bool {
         match self {
             Self::Plastic(bsdf) => bsdf.coat.is_smooth() || !bsdf.coat.is_anisotropic(),
@@ -237,6 +255,7 @@ impl Bsdf {
                 bsdf.coat.is_smooth() || !bsdf.coat.is_anisotropic()
             }
             Self::Principled(bsdf) => bsdf.is_basic(),
+            Self::Hair(_) => true,
             _ => false,
         }
     }

@@ -4,6 +4,7 @@ mod aabb;
 pub mod bernstein;
 pub mod compact;
 mod cone;
+mod exponential;
 pub mod float;
 mod frame;
 mod motion;
@@ -19,6 +20,7 @@ pub mod vectorize;
 
 pub use aabb::{Aabb, Bounds};
 pub use cone::RayCone;
+pub use exponential::{exp_of, ln_of};
 pub use frame::Frame;
 pub use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, DVec4, Vec2, Vec3, Vec4, dvec2, dvec3, vec2, vec3};
 pub use motion::Motion;

@@ -21,7 +21,7 @@ fn bsdfs() -> Vec<Bsdf> {
         ];
         made.into_iter().chain([single(gold(alpha)), single(glass(alpha))])
     });
-    rough.chain([gold([0.0; 2]), glass([0.0; 2])]).chain(plastics()).chain(principled()).collect()
+    rough.chain([gold([0.0; 2]), glass([0.0; 2])]).chain(plastics()).chain(principled()).chain(hair()).collect()
 }
 
 fn principled() -> impl Iterator<Item = Bsdf> {
@@ -40,6 +40,11 @@ fn principled() -> impl Iterator<Item = Bsdf> {
     });
     let coated = PrincipledParameters { clearcoat: 0.7, sheen: 0.2, ..with(0.2, 0.4, PrincipledModel::Burley, true) };
     basic.chain([coated]).map(|parameters| Bsdf::Principled(Principled::new(&parameters)))
+}
+
+fn hair() -> impl Iterator<Item = Bsdf> {
+    let roughness = [[0.3, 0.3], [0.02, 0.05], [1.0, 0.25]];
+    roughness.into_iter().map(|roughness| Bsdf::Hair(Hair::new(Rgb::new(0.2, 0.6, 1.5), 1.55, roughness, 0.035)))
 }
 
 fn plastics() -> impl Iterator<Item = Bsdf> {
@@ -77,6 +82,9 @@ fn recolored(bsdf: &Bsdf, random: &mut Rng) -> Bsdf {
                 ..PrincipledParameters::default()
             }))
         }
+        Bsdf::Hair(hair) => {
+            Bsdf::Hair(hair.with_absorption(Rgb::from(std::array::from_fn(|_| 3.0 * random.unit_f32()))))
+        }
         other => other.clone(),
     }
 }
@@ -84,7 +92,7 @@ fn recolored(bsdf: &Bsdf, random: &mut Rng) -> Bsdf {
 #[test]
 fn queries_in_rows_have_the_bits_of_single_ones() {
     let varying: Vec<Bsdf> = bsdfs().into_iter().filter(Bsdf::can_vary).collect();
-    assert!(varying.len() >= 18);
+    assert!(varying.len() >= 21);
     for (bsdf, varies) in
         bsdfs().into_iter().map(|bsdf| (bsdf, false)).chain(varying.into_iter().map(|bsdf| (bsdf, true)))
     {

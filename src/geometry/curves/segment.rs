@@ -35,6 +35,12 @@ const PRECISION: f64 = 1e-10;
 /// Steps at most; those of bisection among them leave less than [`PRECISION`].
 const MAX_STEPS: u32 = 48;
 
+/// Steps at most from a hit of another intersector to the exact one.
+const MAX_REFINEMENTS: u32 = 12;
+
+/// The two differ by less than this many radii.
+const REFINED: f64 = 0.1;
+
 /// A hit closer than this many radii is that of the ribbon that the ray starts on, which faces another ray.
 const FLAT_START: f64 = 2.0;
 
@@ -160,6 +166,25 @@ impl Segment {
         // Not by `map`, which is a call.
         let [a, b, c, d] = self.0;
         Self([space.point(a), space.point(b), space.point(c), space.point(d)])
+    }
+
+    /// Where a ray meets the tube of the segment, given in the ray's space, next to the parameter `u` and the distance
+    /// that another intersector has found; `None` if steps from there lead elsewhere.
+    pub fn refine(&self, mut u: f64, distance: f64) -> Option<SegmentHit> {
+        for _ in 0..MAX_REFINEMENTS {
+            let [p, derivative] = self.at(u);
+            let step = round_step(p, derivative);
+            if step.abs() <= PRECISION {
+                let mut search = Search { kind: CurveKind::Round, pick: Pick::Nearest(distance), best: None };
+                search.offer(p, u);
+                return search.best.filter(|hit| (hit.distance - distance).abs() < REFINED * p.w);
+            }
+            u += step;
+            if !(0.0..=1.0).contains(&u) {
+                return None;
+            }
+        }
+        None
     }
 
     /// Where a ray meets the segment, given in the ray's space.

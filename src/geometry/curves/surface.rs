@@ -2,13 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use super::segment::{Pick, RaySpace};
-use super::{CurveKind, Curves};
+use super::segment::{Pick, RaySpace, Segment, SegmentHit};
+use super::{CurveBasis, CurveKind, Curves};
 use crate::attribute::AttributePoint;
 use crate::geometry::{Hit, SurfaceInteraction};
 use crate::id::PrimId;
 use crate::math::float::F64_CHAIN_ERROR;
-use crate::math::{DVec3, DVec4, Ray, Vec2};
+use crate::math::{DVec3, DVec4, Ray, Vec2, Vec4, angle_of};
 
 /// A point of the surface.
 struct CurvePoint {
@@ -29,14 +29,14 @@ impl Curves {
     ) -> Option<(SurfaceInteraction, crate::math::Vec3)> {
         let segment = self.segment(hit.prim);
         let space = RaySpace::new(ray);
-        let found = self.find(hit.prim, &segment, &space, Pick::Nearest(f64::from(hit.t) * space.length))?;
+        let found = self.find_again(hit, &segment, &space)?;
         let t = found.distance / space.length;
         if t <= 0.0 {
             return None;
         }
         let [center, derivative] = segment.at(found.u);
         let raw = space.origin + space.direction() * found.distance;
-        let tangent = self.tangent(hit.prim, derivative);
+        let tangent = tangent(&segment, derivative);
         let strand = self.strand(hit.prim);
         let [first, end] = [self.strands[strand], self.strands[strand + 1]];
         let at = match self.kind {
@@ -67,22 +67,25 @@ impl Curves {
         Some((interaction, at.dp_dv.as_vec3()))
     }
 
-    /// The unit tangent: where control points coincide, the direction of the segment's chord.
-    fn tangent(&self, prim: PrimId, derivative: DVec4) -> DVec3 {
-        let chord = self.segment(prim).0;
-        derivative
-            .truncate()
-            .try_normalize()
-            .or_else(|| (chord[3] - chord[0]).truncate().try_normalize())
-            .unwrap_or(DVec3::Z)
+    /// A hit to full precision, from the parameter of one that Embree has found, which is not 0.
+    fn find_again(&self, hit: &Hit, segment: &Segment, space: &RaySpace) -> Option<SegmentHit> {
+        let distance = f64::from(hit.t) * space.length;
+        let refined = if hit.u > 0.0 && self.kind == CurveKind::Round {
+            segment.in_space(space).refine(f64::from(hit.u), distance)
+        } else {
+            None
+        };
+        refined.or_else(|| self.find(hit.prim, segment, space, Pick::Nearest(distance)))
     }
 
     /// The point of a tube's sphere `center` next to `raw`, on the strand of the segments from `first` to before `end`.
     fn on_tube(&self, [first, end]: [u32; 2], raw: DVec3, center: DVec4, tangent: DVec3) -> Option<CurvePoint> {
         let n = (raw - center.truncate()).try_normalize()?;
         // The angle is that from the axis that a strand leaves alone most, so that v does not turn along it.
-        let [root, tip] = [first, end - 1].map(|i| self.segment(PrimId(i)).0);
-        let chord = (tip[3] - root[0]).truncate().abs();
+        let last = if self.basis == CurveBasis::Linear { 1 } else { 3 };
+        let [root, tip] = [self.segments[first as usize], self.segments[end as usize - 1] + last]
+            .map(|i| Vec4::from(self.points[i as usize]).truncate());
+        let chord = (tip - root).abs();
         let axis = if chord.x <= chord.y.min(chord.z) {
             DVec3::X
         } else if chord.y <= chord.z {
@@ -91,12 +94,12 @@ impl Curves {
             DVec3::Z
         };
         let across = tangent.cross(axis).try_normalize().unwrap_or_else(|| tangent.any_orthonormal_vector());
-        let angle = n.dot(across).atan2(n.dot(across.cross(tangent)));
+        let angle = angle_of(n.dot(across) as f32, n.dot(across.cross(tangent)) as f32);
         Some(CurvePoint {
             p: center.truncate() + n * center.w,
             n,
             dp_dv: tangent.cross(n) * (TAU * center.w),
-            v: (angle / TAU).rem_euclid(1.0),
+            v: (f64::from(angle) / TAU).rem_euclid(1.0),
         })
     }
 
@@ -134,6 +137,12 @@ impl Curves {
         }
         best
     }
+}
+
+/// The unit tangent: where control points coincide, the direction of the segment's chord.
+fn tangent(segment: &Segment, derivative: DVec4) -> DVec3 {
+    let chord = || (segment.0[3] - segment.0[0]).truncate().try_normalize();
+    derivative.truncate().try_normalize().or_else(chord).unwrap_or(DVec3::Z)
 }
 
 /// The point of a ribbon that faces a ray along `direction`.

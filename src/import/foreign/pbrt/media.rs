@@ -65,7 +65,10 @@ impl MediumTable {
         let kind = params.string("type")?.unwrap_or("homogeneous");
         if !matches!(kind, "homogeneous" | "uniformgrid" | "rgbgrid") {
             let why = match kind {
-                "nanovdb" => "NanoVDB files are not supported: left out",
+                "nanovdb" => {
+                    "NanoVDB files are not supported: left out; convert the grid to plain floats and give the medium a \
+                     `volume` with that file"
+                }
                 _ => "only homogeneous media, uniformgrid and rgbgrid are supported: left out",
             };
             draft.ignored(&params.place, &params.element, "", why);

@@ -45,6 +45,7 @@ fn vdb_files_and_unknown_media_are_left_out_and_said() {
     let grid = "MakeNamedMedium \"cloud\" \"string type\" \"nanovdb\" \"string filename\" \"a.nvdb\"\n";
     let found = world(&format!("{grid}MediumInterface \"cloud\" \"fog\"\nMaterial \"dielectric\"\nShape \"sphere\""));
     assert_eq!(outcome(&found, "MakeNamedMedium", ""), Outcome::Ignored);
+    assert!(found.report.entries.iter().any(|entry| entry.note.contains("convert the grid to plain floats")));
     assert_eq!(outcome(&found, "Shape", "MediumInterface"), Outcome::Ignored);
     assert!(found.desc.media.is_empty() && found.desc.medium.is_none());
 }
