@@ -246,8 +246,8 @@ macro_rules! lanes {
 }
 
 impl Bsdf {
-    /// Whether BSDFs of one material that are like this one, and of plastics and hair those that differ in colours alone,
-    /// can be one group of queries.
+    /// Whether BSDFs of one material that are like this one, and of plastics and hair those that differ in colours
+    /// alone, can be one group of queries.
     pub fn can_vary(&self) -> bool {
         match self {
             Self::Plastic(bsdf) => bsdf.coat.is_smooth() || !bsdf.coat.is_anisotropic(),

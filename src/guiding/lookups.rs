@@ -76,8 +76,8 @@ fn find_curve_points(directions: &Vec3Rows, rows: &mut LookupRows, count: usize)
 
 #[inline(always)]
 fn find_light_points(u: &Row, rows: &mut LookupRows, count: usize) {
-    for i in 0..count.min(BATCH) {
-        let point = LightPoint::of(u[i]);
+    for (i, &u) in u.iter().enumerate().take(count) {
+        let point = LightPoint::of(u);
         (rows.number[i], rows.fraction[i]) = (point.light, point.fraction);
     }
 }
@@ -108,18 +108,18 @@ fn cell(rows: &LookupRows, i: usize) -> Cell {
 
 #[inline(always)]
 fn find_densities(rows: &LookupRows, pdf: &mut Row, count: usize) {
-    for i in 0..count.min(BATCH) {
+    for (i, pdf) in pdf.iter_mut().enumerate().take(count) {
         let density = cell(rows, i).density();
         // Directions that are not looked up may have no density per angle.
-        pdf[i] = if density > 0.0 { density * rows.per_angle[i] } else { 0.0 };
+        *pdf = if density > 0.0 { density * rows.per_angle[i] } else { 0.0 };
     }
 }
 
 #[inline(always)]
 fn place_samples(rows: &mut LookupRows, v: &Row, directions: &mut Vec3Rows, count: usize) {
-    for i in 0..count.min(BATCH) {
+    for (i, &v) in v.iter().enumerate().take(count) {
         let point = LightPoint { light: rows.number[i], fraction: rows.fraction[i] };
-        let (direction, per_angle) = cell(rows, i).direction(point, v[i]);
+        let (direction, per_angle) = cell(rows, i).direction(point, v);
         directions.set(i, direction);
         rows.per_angle[i] = per_angle;
     }

@@ -176,7 +176,7 @@ impl Segment {
             let step = round_step(p, derivative);
             if step.abs() <= PRECISION {
                 let mut search = Search { kind: CurveKind::Round, pick: Pick::Nearest(distance), best: None };
-                search.offer(p, u);
+                search.offer(p + derivative * step, u + step);
                 return search.best.filter(|hit| (hit.distance - distance).abs() < REFINED * p.w);
             }
             u += step;
@@ -270,7 +270,7 @@ impl Search {
             let step = if self.kind == CurveKind::Round { round_step(p, dp) } else { flat_step(p, dp) };
             if step.abs() <= PRECISION {
                 let share = 1.0 / f64::from(1 << (MAX_DEPTH - depth));
-                return self.offer(p, (u + s * share).clamp(0.0, 1.0));
+                return self.offer(p + dp * step, (u + (s + step) * share).clamp(0.0, 1.0));
             }
             // False for a NaN.
             let leads_on = if step > 0.0 { s < high } else { step < 0.0 && s > low };

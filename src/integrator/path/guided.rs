@@ -178,7 +178,7 @@ impl GuideRecorder {
         let is_of_bsdf = |i: usize| mix.is_guide_sample[i] == 0 && scatter.is_valid[i] != 0 && scatter.is_delta[i] == 0;
         let distributions = regions.distributions(is_of_bsdf);
         lookups.find_pdfs(&distributions, &mix.bsdf_direction, &mut mix.guide_pdf_of_bsdf, count);
-        vectorize!(mix_samples(&regions.bsdf_sampling_fraction, samples, evals, mix, scatter, count));
+        vectorize!(mix_samples(&regions.bsdf_sampling_fraction, samples, evals, mix, scatter));
     }
 
     /// Records the directions of the paths that go on.
@@ -224,15 +224,15 @@ impl GuideRecorder {
 
 #[inline(always)]
 fn mix_pdfs(bsdf_sampling_fraction: &Row, guide_pdf: &Row, pdf: &mut Row) {
-    for i in 0..BATCH {
-        pdf[i] = mixed(bsdf_sampling_fraction[i], pdf[i], guide_pdf[i]);
+    for ((pdf, &fraction), &guide_pdf) in pdf.iter_mut().zip(bsdf_sampling_fraction).zip(guide_pdf) {
+        *pdf = mixed(fraction, *pdf, guide_pdf);
     }
 }
 
 #[inline(always)]
 fn rescale_choices(bsdf_sampling_fraction: &Row, u: &mut SampleRows) {
-    for i in 0..BATCH {
-        u.set_first(i, (u.of(i)[0] / bsdf_sampling_fraction[i]).min(ONE_MINUS_EPSILON));
+    for (i, fraction) in bsdf_sampling_fraction.iter().enumerate() {
+        u.set_first(i, (u.of(i)[0] / fraction).min(ONE_MINUS_EPSILON));
     }
 }
 
@@ -251,10 +251,8 @@ fn mix_samples(
     evals: &EvalRows,
     mix: &mut MixRows,
     scatter: &mut ScatterRows,
-    count: usize,
 ) {
-    for i in 0..count.min(BATCH) {
-        let fraction = bsdf_sampling_fraction[i];
+    for (i, &fraction) in bsdf_sampling_fraction.iter().enumerate() {
         let is_guide_sample = mix.is_guide_sample[i] != 0;
         let (bsdf_pdf, guide_pdf) =
             if is_guide_sample { (evals.pdf[i], samples.pdf[i]) } else { (scatter.pdf[i], mix.guide_pdf_of_bsdf[i]) };
