@@ -75,7 +75,9 @@ fn renders_with_a_trained_guide_are_split_cropped_and_replayed() {
     run_ok(dir, "render room.json --guide a.state --target-error 10 --float -o adaptive.exr");
 }
 
-/// Half the squared difference of two renders is the variance of one.
+/// Half the squared difference of two renders is the variance of one. Errors without the thousandth of the pixels where
+/// they are largest: over 24 guides their ratio was 0.524 with a standard deviation of 0.023, whereas rare bright
+/// pixels make that of all errors vary by 0.07.
 #[test]
 fn a_trained_guide_lowers_the_error_and_keeps_the_mean() {
     let folder = trained();
@@ -86,13 +88,16 @@ fn a_trained_guide_lowers_the_error_and_keeps_the_mean() {
         }
         let (a, b) = (pixels(dir, "1.exr"), pixels(dir, "2.exr"));
         let mean = a.iter().chain(&b).map(|v| f64::from(*v)).sum::<f64>() / (a.len() + b.len()) as f64;
-        let difference = a.iter().zip(&b).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
-        (mean, difference)
+        let differences = a.iter().zip(&b).map(|(a, b)| f64::from(a - b).powi(2));
+        let mut errors = differences.collect::<Vec<_>>();
+        errors.sort_by(f64::total_cmp);
+        let typical = errors[..errors.len() - errors.len() / 1000].iter().sum::<f64>();
+        (mean, typical, errors.iter().sum::<f64>())
     };
     let (guided, plain) = (statistics("--guide a.state"), statistics(""));
     assert!(guided.1 < 0.7 * plain.1, "{guided:?} {plain:?}");
     // The standard error of each mean by the differences of its pixels, which are independent.
-    let deviation = (guided.1 + plain.1).sqrt() / (2.0 * 192.0 * 192.0 * 4.0);
+    let deviation = (guided.2 + plain.2).sqrt() / (2.0 * 192.0 * 192.0 * 4.0);
     assert!((guided.0 - plain.0).abs() < 5.0 * deviation, "{guided:?} {plain:?} {deviation}");
 }
 
