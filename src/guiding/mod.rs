@@ -81,21 +81,22 @@ struct Leaf {
 
 impl Leaf {
     /// Adds light whose direction the BSDF and the guide choose with these densities.
-    fn add_gains(&self, [surface, guide]: [f32; 2], amount: f32) {
-        if !((surface + guide).is_finite() && surface + guide > 0.0) {
+    fn add_gains(&self, [bsdf, guide]: [f32; 2], amount: f32) {
+        if !((bsdf + guide).is_finite() && bsdf + guide > 0.0) {
             return;
         }
-        let usual = BSDF_SAMPLING_FRACTION * surface + (1.0 - BSDF_SAMPLING_FRACTION) * guide;
-        for (sum, share) in self.gains.iter().zip(OTHER_FRACTIONS) {
-            let gain = ((share * surface + (1.0 - share) * guide) / usual).ln();
+        let usual = BSDF_SAMPLING_FRACTION * bsdf + (1.0 - BSDF_SAMPLING_FRACTION) * guide;
+        for (sum, fraction) in self.gains.iter().zip(OTHER_FRACTIONS) {
+            let gain = ((fraction * bsdf + (1.0 - fraction) * guide) / usual).ln();
             sum.fetch_add((amount * gain) as i64, Ordering::Relaxed);
         }
     }
 
-    /// The best share by the records.
-    fn best_share(&self) -> f32 {
+    /// The best BSDF sampling fraction by the records.
+    fn best_bsdf_sampling_fraction(&self) -> f32 {
         let best = self.gains.iter().zip(OTHER_FRACTIONS).max_by_key(|(gain, _)| gain.load(Ordering::Relaxed));
-        best.filter(|(gain, _)| gain.load(Ordering::Relaxed) > 0).map_or(BSDF_SAMPLING_FRACTION, |(_, share)| share)
+        best.filter(|(gain, _)| gain.load(Ordering::Relaxed) > 0)
+            .map_or(BSDF_SAMPLING_FRACTION, |(_, fraction)| fraction)
     }
 }
 
@@ -119,13 +120,13 @@ pub struct Record {
     pub direction: Vec3,
     /// What was scattered towards the path, over the density with which the direction was chosen.
     pub light: f32,
-    /// The densities with which the surface and the guide choose the direction, if the guide had a distribution.
+    /// The densities with which the BSDF and the guide choose the direction, if the guide had a distribution.
     pub densities: Option<[f32; 2]>,
 }
 
 /// A record on its way to the cell that it belongs to.
 #[derive(Clone, Copy, Debug, Default)]
-struct RecordUnderWay {
+struct PendingRecord {
     leaf: usize,
     /// As a point of the square.
     direction: [f32; 2],
@@ -235,30 +236,30 @@ impl Guide {
                 *leaf = self.trees.find(TreePoint::new(root(record.n), self.normalized(record.p)));
                 prefetch(&self.leaves, *leaf);
             }
-            let mut under_way = [RecordUnderWay::default(); BATCH];
+            let mut pending = [PendingRecord::default(); BATCH];
             let mut count = 0;
             for (record, &leaf) in records.iter().zip(&leaves) {
-                if let Some(next) = self.find_leaf(record, leaf) {
+                if let Some(next) = self.count_record(record, leaf) {
                     prefetch(&self.leaves, next.leaf);
-                    under_way[count] = next;
+                    pending[count] = next;
                     count += 1;
                 }
             }
-            let under_way = &mut under_way[..count];
-            under_way.iter().for_each(|record| self.leaves[record.leaf].records.prefetch());
-            self.descend(under_way);
-            for record in &mut *under_way {
+            let pending = &mut pending[..count];
+            pending.iter().for_each(|record| self.leaves[record.leaf].records.prefetch());
+            self.descend(pending);
+            for record in &mut *pending {
                 record.cell = record.cell.jittered(record.direction, record.jitter);
             }
-            self.descend(under_way);
-            for record in under_way {
+            self.descend(pending);
+            for record in pending {
                 self.leaves[record.leaf].records.add(&record.cell, record.amount);
             }
         }
     }
 
     /// Counts a record in the leaf around it; the result is where its light belongs, if it has any.
-    fn find_leaf(&self, record: &Record, leaf: usize) -> Option<RecordUnderWay> {
+    fn count_record(&self, record: &Record, leaf: usize) -> Option<PendingRecord> {
         let Record { direction, light, densities, .. } = *record;
         self.leaves[leaf].count.fetch_add(1, Ordering::Relaxed);
         if !(light > 0.0 && light < f32::INFINITY && direction.is_finite()) {
@@ -284,18 +285,18 @@ impl Guide {
         let leaf = if is_inside { self.trees.find(TreePoint::new(root(record.n), moved)) } else { leaf };
         let (direction, _) = square_of(direction);
         let jitter = [unit(second), unit(second >> 32)];
-        Some(RecordUnderWay { leaf, direction, jitter, amount: amount as u64, cell: Descent::to(direction) })
+        Some(PendingRecord { leaf, direction, jitter, amount: amount as u64, cell: Descent::to(direction) })
     }
 
     /// Descends to the cells of all records, a step of each at a time.
-    fn descend(&self, records: &mut [RecordUnderWay]) {
+    fn descend(&self, records: &mut [PendingRecord]) {
         let mut lanes: [u8; BATCH] = std::array::from_fn(|lane| lane as u8);
         let mut count = records.len();
         while count > 0 {
             let mut left = 0;
             for i in 0..count {
                 let lane = lanes[i];
-                let RecordUnderWay { leaf, cell, .. } = &mut records[usize::from(lane)];
+                let PendingRecord { leaf, cell, .. } = &mut records[usize::from(lane)];
                 if self.leaves[*leaf].records.step(cell) {
                     lanes[left] = lane;
                     left += 1;
@@ -324,7 +325,7 @@ impl Guide {
             let directions = leaf.records.directions();
             let records = leaf.records.refined(most_nodes, parts.len());
             let (count, bsdf_sampling_fraction) =
-                (leaf.count.load(Ordering::Relaxed) / parts.len() as u64, leaf.best_share());
+                (leaf.count.load(Ordering::Relaxed) / parts.len() as u64, leaf.best_bsdf_sampling_fraction());
             for &part in &parts {
                 nodes[part] = Node::of_leaf(next_leaves.len());
                 learned.push(Region { directions: directions.clone(), bsdf_sampling_fraction });
