@@ -1,5 +1,5 @@
-//! Short forms: one entry where a list is expected, one number for all entries of a short list. And one that is none: a
-//! list where an object is expected.
+//! Short forms: one entry where a list is expected, one number for all entries of a short list. Objects, for which
+//! serde would accept lists too.
 
 use std::borrow::Cow;
 use std::fmt;

@@ -12,10 +12,11 @@ pub type Distributions<'a> = [Option<&'a DirectionDistribution>; BATCH];
 soa! {
     /// What is looked up, and the cells that were found.
     struct LookupRows {
-        /// On the curve, or of the light.
+        /// The key that is searched for: a place on the curve, or an amount of light.
         number: u32,
+        /// As in [`CurvePoint`].
         per_angle: f32,
-        /// How far a sample is from its number to the next.
+        /// As in [`LightPoint`].
         fraction: f32,
         /// As in [`Cell`].
         start: u32,

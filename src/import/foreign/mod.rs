@@ -55,7 +55,7 @@ impl Imported {
 }
 
 /// The error for a file that is there and, by its extension, no scene.
-fn what_it_is(file: &Path, extension: &str) -> Option<Error> {
+fn not_a_scene(file: &Path, extension: &str) -> Option<Error> {
     let message = match extension {
         "obj" | "ply" | "stl" => "a mesh, not a scene: a scene names it as `file` of a shape of type `mesh`",
         "exr" | "png" | "jpg" | "jpeg" | "hdr" | "tif" | "tiff" => "an image, not a scene",
@@ -80,7 +80,7 @@ pub fn read_scene(path: &Path, options: &ImportOptions) -> Result<Imported> {
         "pbrt" => pbrt::read(path, options),
         "gltf" | "glb" => gltf::read(path, options),
         _ => {
-            let desc = load_scene(path).map_err(|error| what_it_is(path, &extension).unwrap_or(error))?;
+            let desc = load_scene(path).map_err(|error| not_a_scene(path, &extension).unwrap_or(error))?;
             Ok(Imported {
                 desc,
                 assets: Arc::default(),
