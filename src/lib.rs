@@ -20,7 +20,7 @@
 //! | 4 | `accel`, `material`, `medium`, `opacity`, `normal_perturbation`, `light`, `output` |
 //! | 5 | `scene`, `denoise` |
 //! | 6 | `import`, `integrator`, `compile` |
-//! | 7 | `render`, `convert` |
+//! | 7 | `render`, `convert`, `loading` |
 //! | 8 | `farm`, `live`, `renderer` |
 
 mod accel;
@@ -47,6 +47,7 @@ mod import;
 mod integrator;
 mod light;
 mod live;
+mod loading;
 mod material;
 mod math;
 mod medium;
@@ -109,6 +110,7 @@ pub mod internal {
         integrator,
         light,
         live,
+        loading,
         material,
         math,
         medium,

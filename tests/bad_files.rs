@@ -60,12 +60,18 @@ fn files_that_nothing_uses_are_not_read() {
             "bad.png",
         ),
         ("/objects/lamp/shapes/0", quad("gone_relief"), ErrorKind::AssetMissing, "gone.png"),
-        ("/instances/0/object", json!("idle"), ErrorKind::AssetMissing, "gone."),
     ] {
         let mut scene = scene.clone();
         *scene.pointer_mut(pointer).unwrap() = use_;
         assert_error(&folder, &scene, kind, &[file]);
     }
+    scene["instances"][0]["object"] = json!("idle");
+    let error = folder.compile(&scene).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::AssetMissing, "{error}");
+    for (part, file) in error.parts().iter().zip(["gone.png", "gone.ply", "bad.ply", "gone.obj"]) {
+        assert!(part.to_string().contains(file), "{file}: {error}");
+    }
+    assert_eq!(error.parts().len(), 4, "{error}");
 }
 
 #[test]

@@ -34,13 +34,4 @@ impl Faults {
     pub fn into_result(self) -> Result<()> {
         Error::from_all(self.0).map_or(Ok(()), Err)
     }
-
-    /// A value, unless it is a fault or there is another.
-    pub fn check<T>(mut self, value: Result<T>) -> Result<T> {
-        let value = self.keep(value);
-        match (Error::from_all(self.0), value) {
-            (None, Some(value)) => Ok(value),
-            (error, _) => Err(error.unwrap_or_else(|| Error::Internal("a fault without a message".into()))),
-        }
-    }
 }

@@ -66,11 +66,11 @@ impl MaterialTable {
     pub const DEFAULT: MaterialId = MaterialId(0);
 
     /// All materials of a scene; for each that has a fault, which is kept, there is the default one.
-    pub fn new(files: &CompileContext, desc: &SceneDesc, used: &UsedNames, faults: &mut Faults) -> Result<Self> {
-        let textures = TextureTable::new(files, desc, used)?;
+    pub fn new(files: &CompileContext, desc: &SceneDesc, used: &UsedNames, faults: &mut Faults) -> Self {
+        let textures = TextureTable::new(files, desc, used, faults);
         let default = Material::from(Lambert { albedo: Rgb::splat(0.5) });
         let mut table = Self { materials: vec![default], ..Self::default() };
-        let media = NamedMedia::new(files, desc, used)?;
+        let media = NamedMedia::new(files, desc, used, faults);
         let compiler = Compiler { files, textures: &textures, media: &media };
         for name in desc.materials.keys() {
             let mut outer = Vec::new();
@@ -82,11 +82,11 @@ impl MaterialTable {
                 }
             }
         }
-        let within = Media::new(table.medium_of.values().copied(), media.around(files, desc)?);
+        let within = Media::new(table.medium_of.values().copied(), faults.keep(media.around(files, desc)).flatten());
         table.media_names = within.iter().map(|medium| media.name_of(medium).map(str::to_owned)).collect();
         table.media = within.with_volumes(media.volumes);
         table.textures = textures;
-        Ok(table)
+        table
     }
 
     /// Compiles a material and what it consists of, unless that is done. `outer` are the materials that consist of it.

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::CompileContext;
+use super::faults::Faults;
 use super::materials::{Compiler, MaterialTable};
 use crate::bsdf::{MAX_PHASE_LOBES, Phase, PhaseLobe, WeightedLobe};
 use crate::color::Rgb;
@@ -73,18 +74,21 @@ pub(super) struct NamedMedia<'a> {
 
 impl<'a> NamedMedia<'a> {
     /// All of a scene; what differs within those that are not used is not read.
-    pub fn new(files: &CompileContext, desc: &'a SceneDesc, used: &UsedNames) -> Result<Self> {
+    pub fn new(files: &CompileContext, desc: &'a SceneDesc, used: &UsedNames, faults: &mut Faults) -> Self {
         let mut all = Self { media: BTreeMap::new(), volumes: Vec::new() };
         for (name, desc) in &desc.media {
             let path = format!("media.{name}");
-            let mut medium = participating(files, &path, desc)?;
-            if let Some(volume) = desc.volume.as_ref().filter(|_| used.media.contains(name)) {
-                all.volumes.push(super::volumes::volume(files, &format!("{path}.volume"), volume, &medium)?);
-                medium.volume = Some(VolumeId::new(all.volumes.len() - 1));
-            }
-            all.media.insert(name, medium);
+            let medium = participating(files, &path, desc).and_then(|mut medium| {
+                if let Some(volume) = desc.volume.as_ref().filter(|_| used.media.contains(name)) {
+                    all.volumes.push(super::volumes::volume(files, &format!("{path}.volume"), volume, &medium)?);
+                    medium.volume = Some(VolumeId::new(all.volumes.len() - 1));
+                }
+                Ok(medium)
+            });
+            // What uses a faulty one has no fault of its own.
+            all.media.insert(name, faults.keep(medium).unwrap_or_else(|| Medium::clear(0)));
         }
-        Ok(all)
+        all
     }
 
     /// The medium that `path` names.

@@ -47,6 +47,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::assets::{AssetError, SceneSource};
+use crate::camera::Camera;
 use crate::desc::{CausticsDesc, IntegratorDesc, SceneDesc};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Shape};
@@ -64,6 +65,7 @@ use identities::IdentityTable;
 use lights::LightTable;
 use materials::MaterialTable;
 use meshes::MeshStore;
+use objects::PreparedWorld;
 use transforms::Shutter;
 
 /// Compiles a scene; the files it names are looked up beside `scene_file`.
@@ -82,6 +84,17 @@ pub fn compile_from(desc: &SceneDesc, source: SceneSource) -> Result<Scene> {
     CheckedScene::new(desc, source)?.compile()
 }
 
+/// What is wrong with the settings of a scene, its names and the files that it names.
+pub fn find_faults(desc: &SceneDesc, source: SceneSource) -> Option<Error> {
+    let checked = match CheckedScene::new(desc, source) {
+        Ok(checked) => checked,
+        Err(error) => return Some(error),
+    };
+    let mut faults = Faults::default();
+    Builder::read(desc, checked.files, &checked.camera, &mut faults);
+    faults.into_result().err()
+}
+
 impl CheckedScene<'_> {
     /// Compiles the scene.
     ///
@@ -89,39 +102,9 @@ impl CheckedScene<'_> {
     /// As [`compile`].
     pub fn compile(self) -> Result<Scene> {
         let Self { desc, files, camera } = self;
-        let used = desc.used_names();
         let mut faults = Faults::default();
-        let materials = MaterialTable::new(&files, desc, &used, &mut faults)?;
-        let mut builder = Builder {
-            meshes: MeshStore::read(&files, desc, &used),
-            files,
-            shutter: Shutter::from(camera.shutter()),
-            surroundings: camera.places(),
-            dicing: Dicing {
-                camera: camera.clone(),
-                size: [desc.film.width, desc.film.height],
-                instances: BTreeMap::new(),
-            },
-            materials,
-            geometry: Geometry::default(),
-            surfaces: Vec::new(),
-            opacities: Vec::new(),
-            paths: Vec::new(),
-            lights: LightTable::default(),
-            identities: IdentityTable::new(desc),
-            space: RenderSpace::WORLD,
-            object_spaces: Vec::new(),
-        };
-        let prepared = builder.prepare_world(desc, &used, &mut faults);
-        if !faults.is_empty() {
-            // The faults of lights are reported with those of materials and shapes.
-            for (i, light) in desc.lights.iter().enumerate() {
-                let path = format!("lights[{i}]");
-                let textures = &builder.materials.textures;
-                faults.keep(lights::compile(&builder.files, &path, light, &RenderSpace::WORLD, textures));
-            }
-            faults.into_result()?;
-        }
+        let (mut builder, prepared) = Builder::read(desc, files, &camera, &mut faults);
+        faults.into_result()?;
         builder.add_world(desc, prepared)?;
         builder.warn_of_coincident();
         let mut faults = Faults::default();
@@ -238,6 +221,47 @@ struct Builder {
 }
 
 impl Builder {
+    /// Reads and checks what a scene has and the files that it names. The world is complete if no fault is found.
+    fn read<'a>(
+        desc: &'a SceneDesc,
+        files: CompileContext,
+        camera: &Camera,
+        faults: &mut Faults,
+    ) -> (Self, PreparedWorld<'a>) {
+        let used = desc.used_names();
+        let materials = MaterialTable::new(&files, desc, &used, faults);
+        let mut builder = Self {
+            meshes: MeshStore::read(&files, desc, &used),
+            files,
+            shutter: Shutter::from(camera.shutter()),
+            surroundings: camera.places(),
+            dicing: Dicing {
+                camera: camera.clone(),
+                size: [desc.film.width, desc.film.height],
+                instances: BTreeMap::new(),
+            },
+            materials,
+            geometry: Geometry::default(),
+            surfaces: Vec::new(),
+            opacities: Vec::new(),
+            paths: Vec::new(),
+            lights: LightTable::default(),
+            identities: IdentityTable::new(desc),
+            space: RenderSpace::WORLD,
+            object_spaces: Vec::new(),
+        };
+        let prepared = builder.prepare_world(desc, &used, faults);
+        if !faults.is_empty() {
+            // The faults of lights are reported with those of materials and shapes.
+            for (i, light) in desc.lights.iter().enumerate() {
+                let path = format!("lights[{i}]");
+                let textures = &builder.materials.textures;
+                faults.keep(lights::compile(&builder.files, &path, light, &RenderSpace::WORLD, textures));
+            }
+        }
+        (builder, prepared)
+    }
+
     /// The media of all surfaces, and what is around them.
     fn media_in_use(&self) -> Vec<Medium> {
         let media = &self.materials.media;
@@ -245,7 +269,7 @@ impl Builder {
         of_surfaces.into_iter().map(|id| media.get(id)).chain(media.surroundings()).copied().collect()
     }
 
-    fn finish(mut self, desc: &SceneDesc, camera: crate::camera::Camera) -> Result<Scene> {
+    fn finish(mut self, desc: &SceneDesc, camera: Camera) -> Result<Scene> {
         let files = &self.files;
         self.identities.add_media(&self.materials.media_names);
         if !self.space.is_world() {

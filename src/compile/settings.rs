@@ -5,11 +5,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::faults::Faults;
-use super::{CompileContext, FileCache, camera};
+use super::{Builder, CompileContext, FileCache, camera};
 use crate::assets::SceneSource;
 use crate::camera::Camera;
-use crate::desc::{FilmDesc, FilterDesc, IntegratorDesc, MAX_FILTER_RADIUS, MAX_SIDE, OutputDesc, SceneDesc};
-use crate::error::Result;
+use crate::desc::{
+    CameraDesc, FilmDesc, FilterDesc, IntegratorDesc, MAX_FILTER_RADIUS, MAX_SIDE, OutputDesc, SceneDesc,
+};
+use crate::error::{Error, Result};
 use crate::film::Crop;
 use crate::output::find_output_fault;
 
@@ -23,11 +25,11 @@ pub struct CheckedScene<'a> {
 
 impl<'a> CheckedScene<'a> {
     /// Checks the numbers of film, sampler, camera, integrator and outputs of a scene that was read from a file of any
-    /// kind; errors name the places in that file.
+    /// kind; errors name the places in that file. Only if there is a fault, names and files are checked too.
     ///
     /// # Errors
     /// [`Error::Scene`](crate::Error::Scene) with the key of a number that makes no sense,
-    /// or [`Error::Several`](crate::Error::Several).
+    /// or [`Error::Several`](crate::Error::Several) with all faults of the scene.
     pub fn new(desc: &'a SceneDesc, source: SceneSource) -> Result<Self> {
         Self::check(desc, source.into())
     }
@@ -48,9 +50,24 @@ impl<'a> CheckedScene<'a> {
         }
         faults.keep(check_integrator(&files, &desc.integrator));
         faults.keep(check_outputs(&files, &desc.outputs));
-        let camera = faults.check(camera::compile(&files, &desc.camera))?;
-        Ok(Self { desc, files, camera })
+        let camera = faults.keep(camera::compile(&files, &desc.camera));
+        match (faults.is_empty(), camera) {
+            (true, Some(camera)) => Ok(Self { desc, files, camera }),
+            (_, camera) => Err(all_faults(desc, &files, camera, faults)),
+        }
     }
+}
+
+/// The faults of settings, and with them those of everything else.
+fn all_faults(desc: &SceneDesc, files: &CompileContext, camera: Option<Camera>, mut faults: Faults) -> Error {
+    let camera = camera.map_or_else(|| camera::compile(files, &CameraDesc::at([0.0, 0.0, 1.0], [0.0; 3])), Ok);
+    if let Some(camera) = faults.keep(camera) {
+        // The size may be a fault; surfaces are diced for a small picture.
+        let film = FilmDesc { width: 64, height: 64, ..FilmDesc::default() };
+        let desc = SceneDesc { film, ..desc.clone() };
+        Builder::read(&desc, files.clone(), &camera, &mut faults);
+    }
+    faults.into_result().err().unwrap_or_else(|| Error::Internal("a fault without a message".into()))
 }
 
 /// Checks the numbers of a film and an integrator that `file` holds without a scene.

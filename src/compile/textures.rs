@@ -56,7 +56,7 @@ struct Entry {
 
 impl TextureTable {
     /// The textures of a scene; images of those that are not used are not read.
-    pub fn new(files: &CompileContext, desc: &SceneDesc, used: &UsedNames) -> Result<Self> {
+    pub fn new(files: &CompileContext, desc: &SceneDesc, used: &UsedNames, faults: &mut Faults) -> Self {
         let mut table = Self::default();
         let images = read_all(files, desc, used);
         let mut loader = Loader {
@@ -68,7 +68,6 @@ impl TextureTable {
             open: Vec::new(),
             made: HashMap::new(),
         };
-        let mut faults = Faults::default();
         for name in desc.textures.keys() {
             let place = format!("textures.{name}");
             if let Some(TextureDesc::Image { file, .. }) =
@@ -76,18 +75,16 @@ impl TextureTable {
             {
                 files.warn_of_missing(&format!("{place}.file"), file);
             }
-            let Some(made) = faults.keep(loader.named(&place, name, TextureUse::Color)) else { continue };
-            let color = table.push(made.texture);
-            let data = if made.depends_on_use {
-                table.push(loader.named(&place, name, TextureUse::Data)?.texture)
-            } else {
-                color
-            };
+            // What uses a faulty one has no fault of its own.
+            let made = faults.keep(loader.named(&place, name, TextureUse::Color));
+            let depends_on_use = made.as_ref().is_some_and(|made| made.depends_on_use);
+            let color = table.push(made.map_or(Texture::Constant(Rgb::splat(0.5)), |made| made.texture));
+            let as_data = if depends_on_use { faults.keep(loader.named(&place, name, TextureUse::Data)) } else { None };
+            let data = as_data.map_or(color, |made| table.push(made.texture));
             table.names.insert(name.clone(), Entry { color, data });
         }
-        faults.into_result()?;
         (table.images, table.attributes) = (loader.images, loader.attributes);
-        Ok(table)
+        table
     }
 
     /// Adds a texture without a name.

@@ -8,9 +8,10 @@ mod foreign;
 mod scene_file;
 mod wording;
 
+pub use faults::RepairedScene;
 pub use fingerprint::{SceneFingerprint, files_of_scene, scene_fingerprint};
 pub use foreign::{Draft, ImportOptions, ImportReport, Imported, Outcome, ReportEntry, read_scene};
-pub use scene_file::{load_scene, parse_scene, scene_as_written};
+pub use scene_file::{load_scene, parse_scene, repaired_scene, scene_as_written};
 pub use wording::describe_value;
 
 use crate::desc::SceneDesc;

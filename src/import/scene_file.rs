@@ -7,7 +7,7 @@ use serde_json::error::Category;
 
 use super::comments::blank_comments;
 use super::fault::{self, Step};
-use super::faults::{all_faults, names_key};
+use super::faults::{RepairedScene, all_faults, names_key};
 use super::wording;
 use crate::desc::SceneDesc;
 use crate::error::{Error, Result};
@@ -63,6 +63,15 @@ pub fn scene_as_written(path: &Path) -> Option<Value> {
     serde_json::from_str(&blank_comments(&text).text).ok()
 }
 
+/// A scene file in the native format without its faults of keys and types, to look for others; `None` if that cannot be
+/// told, or if there are none.
+pub fn repaired_scene(path: &Path) -> Option<RepairedScene> {
+    let scene = scene_as_written(path)?;
+    let length = serde_json::to_string(&scene).ok()?.len();
+    let (faults, repaired) = all_faults(&scene, length);
+    repaired.filter(|_| !faults.is_empty())
+}
+
 /// The error for what serde complains about: all faults, as far as they can be told apart.
 fn parse_fault(path: &Path, text: &str, json: &str, error: &serde_path_to_error::Error<serde_json::Error>) -> Error {
     let inner = error.inner();
@@ -84,7 +93,7 @@ fn parse_fault(path: &Path, text: &str, json: &str, error: &serde_path_to_error:
     if fault::refine(&scene, &mut steps).is_none() {
         errors.push((offset(text, inner), plain(&steps)));
     }
-    for fault in all_faults(&scene, text.len()) {
+    for fault in all_faults(&scene, text.len()).0 {
         // Where the message itself names the last key, the place is the key's.
         let names_key = names_key(&fault.steps, &fault.message).is_some();
         let start = fault::locate(json, &fault.steps, names_key).unwrap_or_else(|| offset(text, inner));

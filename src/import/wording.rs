@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::fault::{Step, node_at};
 use super::faults::SceneFault;
-use crate::suggestion::{did_you_mean, elsewhere};
+use crate::suggestion::{did_you_mean, elsewhere, nearest};
 
 /// What is wrong, for a fault of a scene that is valid JSON.
 pub fn describe(fault: &SceneFault, scene: &Value) -> String {
@@ -89,7 +89,7 @@ pub fn describe_syntax(message: &str) -> String {
 
 /// The message about a word that is none of those allowed, which serde's message lists.
 fn unknown(what: &str, message: &str) -> String {
-    let words: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+    let words = words_of(message);
     let Some((given, allowed)) = words.split_first() else { return message.to_owned() };
     let head = format!("unknown {what} \"{given}\"");
     if allowed.is_empty() {
@@ -101,6 +101,18 @@ fn unknown(what: &str, message: &str) -> String {
         Some(place) => format!("{head}: {place}"),
         None => format!("{head}: use one of {}", allowed.join(", ")),
     }
+}
+
+/// The word that is none of those allowed, and those.
+fn words_of(message: &str) -> Vec<&str> {
+    message.split('`').skip(1).step_by(2).collect()
+}
+
+/// The word that the message about an unknown one suggests in its place.
+pub fn suggested(message: &str) -> Option<&str> {
+    let words = words_of(message);
+    let (given, allowed) = words.split_first()?;
+    nearest(given, allowed.iter().copied())
 }
 
 /// "three numbers" of a list that should have them.

@@ -16,9 +16,13 @@ const MAX_CANDIDATES: usize = 10_000;
 /// The end of a message about `name`: ` (did you mean NEAR?)` with the nearest candidate between `quotes`, or nothing
 /// if none is near. The candidate for a word of another program is the one that stands for it here.
 pub fn did_you_mean<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>, [open, close]: [&str; 2]) -> String {
+    nearest(name, candidates).map_or(String::new(), |near| format!(" (did you mean {open}{near}{close}?)"))
+}
+
+/// The candidate that [`did_you_mean`] names.
+pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let candidates: Vec<&str> = candidates.into_iter().collect();
-    let near = synonym(name, &candidates).or_else(|| closest_name(name, candidates));
-    near.map_or(String::new(), |near| format!(" (did you mean {open}{near}{close}?)"))
+    synonym(name, &candidates).or_else(|| closest_name(name, candidates))
 }
 
 /// The candidate that `name` is most likely a slip of, if any is near.

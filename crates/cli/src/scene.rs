@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use steradian::internal::import::{self, Imported, Outcome, ReportEntry};
+use steradian::internal::loading;
 use steradian::internal::output::{self, FileUses};
 use steradian::{Error, Result};
 
@@ -16,7 +17,7 @@ const SUMMARY_LINES: usize = 12;
 
 /// Reads a scene and reports on stderr what of it was approximated or ignored.
 pub fn load(path: &Path, arguments: &ImportArgs, verbosity: Verbosity) -> Result<Imported> {
-    let mut imported = import::read_scene(path, &arguments.options())?;
+    let mut imported = loading::read_scene(path, &arguments.options())?;
     if arguments.allow_missing {
         imported.leave_out_missing(path);
     }

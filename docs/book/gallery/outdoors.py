@@ -205,60 +205,74 @@ def shrine(_):
 
 
 def cumulus(folder):
-    """A cloud over the sea in the evening: a grid of density, many scatterings."""
-    rng = np.random.default_rng(4)
-    nx, ny, nz = 176, 120, 112
-    x, y, z = np.meshgrid(np.linspace(-1.55, 1.55, nx), np.linspace(0, 2.1, ny), np.linspace(-1, 1, nz), indexing="ij")
-    body = np.full((nx, ny, nz), -9.0)
-    puffs = [
-        (-0.55, 0.42, 0, 0.52),
-        (0.1, 0.55, 0.05, 0.66),
-        (0.75, 0.38, 0, 0.45),
-        (0.2, 1.05, -0.05, 0.52),
-        (-0.1, 1.45, 0, 0.36),
-        (1.12, 0.26, 0.05, 0.27),
-        (-1.0, 0.25, 0.05, 0.30),
-    ]
-    puffs += [(rng.uniform(-1, 1), rng.uniform(0.2, 0.7), rng.uniform(-0.35, 0.35), rng.uniform(0.18, 0.36)) for _ in range(16)]
-    for a, b, c, r in puffs:
-        body = np.maximum(body, 1 - np.sqrt((x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2) / r)
+    """Clouds over the sea before sunset: a grid of density, many scatterings."""
+    rng = np.random.default_rng(12)
+    # x from -10 to 10, y from 0 to 4.4 above the clouds' base, z from -4 to 1.6.
+    nx, ny, nz = 640, 160, 192
+    low, high = np.array([-10.0, 1.15, -4.4]), np.array([10.0, 6.15, 1.6])
+    axes = [np.linspace(a, b, n, dtype=np.float32) for a, b, n in zip(low, high, (nx, ny, nz))]
+    x, y, z = np.meshgrid(*axes, indexing="ij", sparse=True)
+    body = np.full((nx, ny, nz), -9.0, np.float32)
+
+    def puff(a, b, c, r):
+        near = [slice(*np.searchsorted(axis, [at - 2 * r, at + 2 * r])) for axis, at in zip(axes, (a, b, c))]
+        distance = np.sqrt((x[near[0]] - a) ** 2 + (y[:, near[1]] - b) ** 2 + (z[:, :, near[2]] - c) ** 2)
+        body[tuple(near)] = np.maximum(body[tuple(near)], 1 - distance / r)
+
+    # Towers of puffs that become smaller upwards: x, z, half the width, height.
+    for a, c, width, top in [(2.1, -0.6, 1.75, 3.3), (-4.6, -2.6, 1.5, 1.5), (-7.6, -1.6, 1.1, 0.9), (7.4, -2.4, 1.7, 1.9), (-1.7, -3.4, 0.9, 0.6), (5.0, -3.7, 0.7, 0.45), (-3.2, 0.4, 0.5, 0.3)]:
+        for k in range(int(46 * width)):
+            up = rng.uniform() ** 1.4
+            reach = width * (1 - up) ** 0.65
+            turn, out = rng.uniform(0, 2 * math.pi), math.sqrt(rng.uniform())
+            size = rng.uniform(0.20, 0.36) * width * (1 - 0.45 * up)
+            puff(a + reach * out * math.cos(turn), low[1] + 0.16 + up * top, c + 0.6 * reach * out * math.sin(turn), size)
     # Billows: creases where noise is zero.
-    cells = np.array([10, 7, 7])
-    billow = sum(0.55**k * np.abs(noise((nx, ny, nz), cells * 2**k, 50 + k, 1)) for k in range(4))
-    floor = np.clip((y - 0.10) / 0.12, 0, 1)
-    density = np.clip((body + 0.62 * (billow - 0.62)) * 7, 0, 1) * floor
+    cells = np.array([40, 10, 12])
+    billow = sum(0.6**k * np.abs(noise((nx, ny, nz), cells * 2**k, 50 + k, 1)) for k in range(5))
+    floor = np.clip((y - low[1] - 0.12 - 0.1 * noise((nx, 1, nz), (24, 1, 8), 60, 3)) / 0.14, 0, 1)
+    density = np.clip((body + 0.85 * (billow - 0.72)) * 9, 0, 1) * floor
     density[0], density[-1], density[:, -1], density[:, :, 0], density[:, :, -1] = 0, 0, 0, 0, 0
     density.transpose(2, 1, 0).astype("<f4").tofile(folder / "cloud.raw")
-    slopes = np.dstack([noise((512, 512), (12, 18), seed, 6, 0.6) for seed in (5, 6)]) * 0.4
-    normal = np.dstack([slopes, np.ones((512, 512))])
-    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
-    write_png(folder / "waves.png", normal / 2 + 0.5)
-    write_sky(folder / "sky.hdr", [0.05, 0.13, 0.42], [0.50, 0.34, 0.34], [0.04, 0.06, 0.12], [1.3, 0.50, 0.14], (-1, 0.06, -0.75), 7)
+    # Waves of many lengths about one direction of the wind, near enough to be seen one by one.
+    x, z = np.meshgrid(np.linspace(-45, 45, 1100, dtype=np.float32), np.linspace(-40, 40, 1600, dtype=np.float32))
+    height = np.zeros_like(x)
+    for _ in range(90):
+        length = 0.28 * 11 ** rng.uniform()
+        angle, phase = rng.normal(math.pi / 2 + 0.3, 0.6), rng.uniform(0, 2 * math.pi)
+        height += 0.0036 * length**0.9 * np.sin(2 * math.pi / length * (x * math.cos(angle) + z * math.sin(angle)) + phase)
+    height_field(folder / "sea.ply", height, (90, 80))
+    sun = np.array([-0.34, 0.165, -1])
+    write_sky(folder / "sky.hdr", [0.05, 0.14, 0.38], [0.62, 0.36, 0.22], [0.04, 0.06, 0.12], [3.4, 1.35, 0.40], sun, 30)
+    middle, half = (low + high) / 2, (high - low) / 2 - 0.002
     return {
         "film": {"width": 1280, "height": 720},
-        "camera": {"position": [0, 0.35, 8.4], "look_at": [0, 1.78, 0], "vertical_fov_degrees": 29},
+        "camera": {"position": [0, 0.75, 9.0], "look_at": [0, 2.2, 0], "vertical_fov_degrees": 34},
         "integrator": {"type": "path", "max_depth": 64, "rr_depth": 16},
         "sampler": {"spp": 48},
-        "textures": {"waves": {"type": "image", "file": "waves.png", "color_space": "linear", "scale": [150, 150]}},
         "media": {
             "cloud": {
-                "scattering": 26,
+                "scattering": 42,
                 "absorption": 0.01,
-                "phase": {"type": "henyey_greenstein", "g": 0.65},
-                "volume": {"density": {"type": "grid", "file": "cloud.raw", "resolution": [nx, ny, nz]}, "bounds": [[-2.3, 1.0, -1.5], [2.3, 4.1, 1.5]]},
+                "phase": {"type": "henyey_greenstein", "g": 0.72},
+                "volume": {"density": {"type": "grid", "file": "cloud.raw", "resolution": [nx, ny, nz]}, "bounds": [low.tolist(), high.tolist()]},
             }
         },
         "materials": {
-            "sea": {"type": "relief", "material": "water", "normal_map": {"texture": "waves", "strength": 0.45}},
-            "water": {"type": "plastic", "albedo": [0.004, 0.012, 0.022], "ior": 1.33, "roughness": 0.12},
+            "sea": {"type": "plastic", "albedo": [0.004, 0.012, 0.022], "ior": 1.33, "roughness": 0.08},
+            "far_sea": {"type": "plastic", "albedo": [0.004, 0.012, 0.022], "ior": 1.33, "roughness": 0.3},
             "cloud": {"type": "dielectric", "ior": 1, "medium": "cloud"},
         },
-        "shapes": [quad("sea", [-300, 0, 20], [600, 0, 0], [0, 0, -600]), box("cloud", [0, 2.55, 0], [2.29, 1.54, 1.49])],
+        "shapes": [
+            quad("far_sea", [-300, -0.2, -20], [600, 0, 0], [0, 0, -600]),
+            mesh("sea", "sea.ply", move(0, 0, -30)),
+            box("cloud", middle.tolist(), half.tolist()),
+        ],
         "lights": [
             {"type": "environment", "file": "sky.hdr", "scale": 0.6},
-            {"type": "directional", "direction": [1, -0.16, -0.42], "irradiance": [11, 5.0, 1.9], "angular_diameter_degrees": 0.53},
+            {"type": "directional", "direction": (-sun).tolist(), "irradiance": [13, 6.6, 2.6], "angular_diameter_degrees": 0.53},
         ],
-        "outputs": [{"file": "cumulus.png", "exposure": 0.1}],
+        "outputs": [{"file": "cumulus.png", "exposure": 0.0}],
     }
 
 
