@@ -111,6 +111,8 @@ fn seen(accel: &dyn Accelerator, geometry: &Geometry, ray: &Ray) -> Option<Surfa
 /// Half of the time a random direction to the side `n`, else a grazing one down to 1e-5. It stays on that side when it
 /// is rounded.
 fn leaving(rng: &mut Rng, n: DVec3) -> DVec3 {
+    // Of a normal rounded to `f32`, the part along a direction near it would not vanish from the tangent.
+    let n = n.normalize();
     let d = rng.direction_around(n);
     let along = (d - n * d.dot(n)).normalize();
     if rng.unit() < 0.5 { (along + n * rng.magnitude(-5.0, -1.0)).normalize() } else { (d + n * 1e-5).normalize() }

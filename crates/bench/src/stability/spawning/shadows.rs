@@ -8,7 +8,7 @@ use crate::geometry::{
     Analytic, Disk, Frustum, Geometry, Mesh, Profile, Quad, Revolution, Shape, Sphere, TransformedShape,
 };
 use crate::id::{PrimId, ShapeId};
-use crate::light::{AreaLight, Emission};
+use crate::light::{AreaLight, Emission, ShadowTarget};
 use crate::math::{DAffine3, DVec3, Transform};
 use crate::stability::geometry::{Rng, grid, mesh, triangle, world};
 
@@ -98,6 +98,12 @@ fn shadow_rays(rng: &mut Rng, emitter: &Shape, distance: f64, count: usize, tall
             let Some(sample) = light.sample(&room.geometry, &[], si.p, rng.pair()) else { continue };
             // The floor is lit from above.
             if f64::from(sample.wi.dot(si.n_g)) * si.n_g.as_dvec3().dot(room.n) < 1e-6 {
+                continue;
+            }
+            // Of an emitter seen edge on, the rounding of its normal decides on the side.
+            if let ShadowTarget::Point(target) = &sample.target
+                && sample.wi.dot(target.n).abs() < 1e-6
+            {
                 continue;
             }
             *rays += 1;
