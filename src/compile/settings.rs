@@ -28,8 +28,8 @@ impl<'a> CheckedScene<'a> {
     /// kind; errors name the places in that file. Only if there is a fault, names and files are checked too.
     ///
     /// # Errors
-    /// [`Error::Scene`](crate::Error::Scene) with the key of a number that makes no sense,
-    /// or [`Error::Several`](crate::Error::Several) with all faults of the scene.
+    /// [`Error::Scene`] with the key of a number that makes no sense,
+    /// or [`Error::Several`] with all faults of the scene.
     pub fn new(desc: &'a SceneDesc, source: SceneSource) -> Result<Self> {
         Self::check(desc, source.into())
     }
