@@ -66,7 +66,7 @@ fn examples_of_shapes_and_materials_compile() {
         let mut scene: serde_json::Value = serde_json::from_str(&stage).unwrap();
         let mut entry: serde_json::Value = serde_json::from_str(body).unwrap();
         match head.split_once(' ').unwrap_or((head, "")).0 {
-            "ShapeDesc" => {}
+            "ShapeDesc" | "SubdivisionDesc" | "DisplacementDesc" => {}
             "MaterialDesc" => {
                 scene["materials"]["shown"] = entry;
                 entry = serde_json::json!({ "type": "sphere", "material": "shown" });

@@ -9,6 +9,11 @@
 # the code of the command.
 set -euo pipefail
 
+# In a mount namespace of its own: what is mounted below the root file system is gone with this process, however it ends.
+if [ -z "${BARE_DEBIAN_NAMESPACE:-}" ] && unshare --mount true 2>/dev/null; then
+    BARE_DEBIAN_NAMESPACE=own exec unshare --mount "$0" "$@"
+fi
+
 suite=bookworm root=
 while [ $# -gt 0 ]; do
     case "$1" in

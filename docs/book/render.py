@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Renders the pictures of the book into src/pictures: the rooms of the tutorial, one scene for each example of a shape and a material, and the gallery.
+"""Renders the pictures of the book into src/pictures: the rooms of the tutorial, one scene for each example of a shape, a material, subdivision and displacement, and the gallery.
 
     docs/book/render.py                              all pictures
     docs/book/render.py material_mix gallery_pool    these only; gallery.py has more options for those of the gallery
@@ -26,8 +26,9 @@ def examples():
     text = (ROOT / "crates/cli/src/manual/examples.txt").read_text()
     for block in text.split("\n# ")[1:]:
         head, body = block.split("\n", 1)
-        kind, _, name = head.strip().partition("Desc ")
-        if kind in ("Shape", "Material"):
+        kind, _, name = head.strip().partition(" ")
+        kind = kind.removesuffix("Desc")
+        if kind in ("Shape", "Material", "Subdivision", "Displacement"):
             yield kind.lower(), name, json.loads(body)
 
 
@@ -48,7 +49,7 @@ def main(wanted):
             if not wanted or scene.stem in wanted:
                 render(scene, scene.stem, folder, "--spp", "128")
         for kind, name, entry in examples():
-            picture = f"{kind}_{name}"
+            picture = f"{kind}_{name}" if name else kind
             if wanted and picture not in wanted:
                 continue
             stage = json.loads(json.dumps(STAGE))

@@ -20,8 +20,13 @@ const PAGES: [(&str, &str, &[&str]); 8] = [
     ("outputs", "Outputs", &["OutputDesc"]),
 ];
 const VALUES: &str = "values";
-/// Types whose variants have a picture, and the first word of its file's name.
-const PICTURES: [(&str, &str); 2] = [("ShapeDesc", "shape"), ("MaterialDesc", "material")];
+/// Types with a picture, of each variant if there are variants, and the first word of its file's name.
+const PICTURES: [(&str, &str); 4] = [
+    ("ShapeDesc", "shape"),
+    ("MaterialDesc", "material"),
+    ("SubdivisionDesc", "subdivision"),
+    ("DisplacementDesc", "displacement"),
+];
 /// Examples: `# TYPE VARIANT`, or `# TYPE`, and the lines below. They are what the pictures show.
 const EXAMPLES: &str = include_str!("examples.txt");
 
@@ -116,6 +121,7 @@ fn section(types: &Types, name: &str, page: &str) -> String {
         }
         text.push('\n');
     } else {
+        text.push_str(&picture(name, ""));
         text.push_str(&table(types, definition, &BTreeSet::new(), page));
     }
     text + &example(name, "")
@@ -124,11 +130,16 @@ fn section(types: &Types, name: &str, page: &str) -> String {
 /// The description of one value of the key `type`.
 fn variant_section(types: &Types, name: &str, variant: &Value, shared: &BTreeSet<&str>, page: &str) -> String {
     let tag = tag(variant).unwrap_or_default();
-    let mut text = format!("### `{tag}`\n\n{}", paragraphs(variant));
-    if let Some((_, kind)) = PICTURES.iter().find(|(pictured, _)| *pictured == name) {
-        let _ = write!(text, "![{} {tag}](../pictures/{kind}_{tag}.jpg)\n\n", title_of(name));
-    }
+    let text = format!("### `{tag}`\n\n{}{}", paragraphs(variant), picture(name, tag));
     text + &table(types, variant, shared, page) + &example(name, tag)
+}
+
+/// The picture of a type's variant, or of a type without variants; empty if it has none.
+fn picture(name: &str, tag: &str) -> String {
+    let Some((_, kind)) = PICTURES.iter().find(|(pictured, _)| *pictured == name) else { return String::new() };
+    let words = [title_of(name), tag.to_owned()].join(" ");
+    let file = [*kind, tag].join("_");
+    format!("![{}](../pictures/{}.jpg)\n\n", words.trim_end(), file.trim_end_matches('_'))
 }
 
 /// The value of the key `type`.
