@@ -16,7 +16,7 @@ pub use blackbody::blackbody;
 pub use noise::Noise;
 pub use subsurface::{Subsurface, half_space_albedo};
 pub use volume::{Coefficients, ExtinctionSplit, FreeFlight, Tracked, Volume, VolumeGrids};
-pub use voxels::{Border, VoxelGrid};
+pub use voxels::{Border, Voxel, VoxelGrid};
 
 use std::cmp::Ordering;
 

@@ -144,3 +144,5 @@ mod vertex_colors;
 mod view;
 /// Options of the command line for view and focus.
 mod views;
+/// Files of OpenVDB and NanoVDB.
+mod volume_files;

@@ -34,6 +34,7 @@ mod subdivision;
 mod summary;
 mod textures;
 mod transforms;
+mod volume_places;
 mod volumes;
 
 pub use changes::SceneChanges;

@@ -1,13 +1,17 @@
 //! What differs within media: grids from files, values or noise.
 
+use std::collections::BTreeMap;
+use std::path::Path;
+
 use super::CompileContext;
 use super::media::MAX_COEFFICIENT;
-use crate::assets::{AssetError, VolumeData, read_raw_volume, read_vol};
+use super::volume_places::Placement;
+use crate::assets::{AssetError, GridChoice, VolumeData, read_raw_volume, read_vol};
 use crate::color::Rgb;
 use crate::desc::{BorderDesc, MediumVolumeDesc, VolumeDesc};
 use crate::error::Result;
-use crate::math::{DAffine3, DMat3, DVec3};
-use crate::medium::{Border, ExtinctionSplit, Medium, Noise, Volume, VolumeGrids, VoxelGrid};
+use crate::math::DAffine3;
+use crate::medium::{Border, ExtinctionSplit, Medium, Noise, Volume, VolumeGrids, Voxel, VoxelGrid};
 use crate::memory::is_available;
 
 /// The largest temperature, in kelvin.
@@ -18,44 +22,44 @@ const MAX_NOISE: u64 = 1 << 27;
 
 /// What differs within `medium`.
 pub(super) fn volume(files: &CompileContext, path: &str, desc: &MediumVolumeDesc, medium: &Medium) -> Result<Volume> {
-    let world_from_unit = placement(files, path, desc)?;
     let MediumVolumeDesc { density, albedo, absorption, scattering, emission, .. } = desc;
-    let part = |key: &str, desc: &Option<VolumeDesc>, limit: f32| {
-        desc.as_ref().map(|desc| Part::read(files, format!("{path}.{key}"), desc, limit)).transpose()
-    };
-    let colors = |key: &str, desc: &Option<VolumeDesc>, limit: f32| {
-        part(key, desc, limit)?.map(|part| part.colors(files)).transpose()
-    };
+    if albedo.is_some() && (absorption.is_some() || scattering.is_some()) {
+        let message = "cannot be given together with `absorption` or `scattering`";
+        return Err(files.error(&format!("{path}.albedo"), message));
+    }
     let brightest = |rgb: Rgb| if rgb.is_black() { f32::MAX } else { MAX_COEFFICIENT / rgb.max_channel() };
     let limit = brightest(medium.extinction()).min(brightest(medium.emission));
-    let split = match (albedo, absorption, scattering) {
-        (None, None, None) => ExtinctionSplit::Even,
-        (Some(_), None, None) => colors("albedo", albedo, 1.0)?.map_or(ExtinctionSplit::Even, ExtinctionSplit::Albedo),
-        (Some(_), _, _) => {
-            let message = "cannot be given together with `absorption` or `scattering`";
-            return Err(files.error(&format!("{path}.albedo"), message));
+    let mut parts = BTreeMap::new();
+    for (key, desc, limit) in [
+        ("density", density, limit),
+        ("albedo", albedo, 1.0),
+        ("absorption", absorption, limit),
+        ("scattering", scattering, limit),
+        ("emission", emission, limit),
+    ] {
+        if let Some(desc) = desc {
+            parts.insert(key, Part::read(files, format!("{path}.{key}"), key, desc, limit)?);
         }
-        (None, _, _) => ExtinctionSplit::Factors {
-            absorption: colors("absorption", absorption, limit)?,
-            scattering: colors("scattering", scattering, limit)?,
-        },
+    }
+    parts.extend(temperature(files, path, desc, medium)?.map(|part| ("temperature", part)));
+    let place = Placement::new(files, path, desc, parts.values())?;
+    let mut take = |key: &str| parts.remove(key);
+    let numbers = |part: Option<Part>| part.map(|part| part.numbers(files, &place)).transpose();
+    let colors = |part: Option<Part>| part.map(|part| part.colors(files, &place)).transpose();
+    let (density, temperature) = (numbers(take("density"))?, numbers(take("temperature"))?);
+    let [albedo, absorption, scattering, emission] =
+        [take("albedo"), take("absorption"), take("scattering"), take("emission")].map(colors);
+    let split = match (albedo?, absorption?, scattering?) {
+        (Some(albedo), ..) => ExtinctionSplit::Albedo(albedo),
+        (None, None, None) => ExtinctionSplit::Even,
+        (None, absorption, scattering) => ExtinctionSplit::Factors { absorption, scattering },
     };
-    let grids = VolumeGrids {
-        density: part("density", density, limit)?.map(|part| part.numbers(files)).transpose()?,
-        split,
-        emission: colors("emission", emission, limit)?,
-        temperature: temperature(files, path, desc, medium)?,
-    };
-    Ok(Volume::new(medium, grids, &world_from_unit))
+    let grids = VolumeGrids { density, split, emission: emission?, temperature };
+    Ok(Volume::new(medium, grids, &place.world_from_unit))
 }
 
 /// The temperature in kelvin.
-fn temperature(
-    files: &CompileContext,
-    path: &str,
-    desc: &MediumVolumeDesc,
-    medium: &Medium,
-) -> Result<Option<VoxelGrid<f32>>> {
+fn temperature(files: &CompileContext, path: &str, desc: &MediumVolumeDesc, medium: &Medium) -> Result<Option<Part>> {
     let MediumVolumeDesc { temperature, temperature_scale, .. } = desc;
     let (path, scale_path) = (format!("{path}.temperature"), format!("{path}.temperature_scale"));
     let scale = temperature_scale.unwrap_or(1.0);
@@ -69,38 +73,35 @@ fn temperature(
     if medium.emission.is_black() {
         return Err(files.error(&path, "needs `emission` of the medium: 1 for the radiance of black bodies"));
     }
-    let mut part = Part::read(files, path, desc, (MAX_TEMPERATURE / scale).min(f32::MAX))?;
+    let mut part = Part::read(files, path, "temperature", desc, (MAX_TEMPERATURE / scale).min(f32::MAX))?;
     part.data.values.iter_mut().for_each(|value| *value *= scale);
-    part.numbers(files).map(Some)
-}
-
-/// The map of the unit cube to the box.
-fn placement(files: &CompileContext, path: &str, desc: &MediumVolumeDesc) -> Result<DAffine3> {
-    let bounds = format!("{path}.bounds");
-    let [a, b] = [files.position(&bounds, desc.bounds[0])?, files.position(&bounds, desc.bounds[1])?];
-    let (min, size) = (a.min(b), (b - a).abs());
-    let into_bounds = DAffine3 { matrix3: DMat3::from_diagonal(size), translation: min };
-    let map = files.affine(&format!("{path}.transform"), &desc.transform)? * into_bounds;
-    let determinant = map.matrix3.determinant().abs();
-    let is_sound = determinant > 0.0 && determinant.is_finite() && map.inverse().is_finite();
-    if !is_sound || map.transform_vector3(DVec3::ONE).length() as f32 == 0.0 {
-        return Err(files.error(&bounds, "the box is flat, or its transform flattens it or is not finite"));
-    }
-    Ok(map)
+    Ok(Some(part))
 }
 
 /// The voxels of one key.
-struct Part {
-    path: String,
-    data: VolumeData,
-    border: Border,
+pub(super) struct Part {
+    pub path: String,
+    pub data: VolumeData,
+    pub border: Border,
+    /// Where the file places them, if it does: the world by numbers of voxels, from 0 to the resolution.
+    pub world_from_voxels: Option<DAffine3>,
 }
 
 impl Part {
     /// Values from 0 to `limit`.
-    fn read(files: &CompileContext, path: String, desc: &VolumeDesc, limit: f32) -> Result<Self> {
+    fn read(files: &CompileContext, path: String, key: &str, desc: &VolumeDesc, limit: f32) -> Result<Self> {
         match desc {
-            VolumeDesc::Grid { file, values, resolution, channels, border } => {
+            VolumeDesc::Grid { file: Some(file), values: None, grid, .. } if is_vdb(files, file) => {
+                Self::read_vdb(files, path, desc, file, GridChoice { name: grid.as_deref(), default: key })?.checked(
+                    files,
+                    Some(file),
+                    limit,
+                )
+            }
+            VolumeDesc::Grid { grid: Some(_), .. } => {
+                Err(files.error(&format!("{path}.grid"), "is the name of a grid of a .vdb or .nvdb file"))
+            }
+            VolumeDesc::Grid { file, values, resolution, channels, border, grid: None } => {
                 let border = match border {
                     BorderDesc::Clamp => Border::Clamp,
                     BorderDesc::Zero => Border::Zero,
@@ -114,21 +115,19 @@ impl Part {
                     }
                     _ => return Err(files.error(&path, "give either `file` or `values`")),
                 };
-                let part = Self { path, data, border };
-                part.check(files, file.as_deref(), limit)?;
-                Ok(part)
+                Self { path, data, border, world_from_voxels: None }.checked(files, file.as_deref(), limit)
             }
             VolumeDesc::Noise { .. } => {
                 let noise = noise(files, &path, desc)?;
                 let data = VolumeData { resolution: noise.resolution, channels: 1, values: noise.values() };
-                Ok(Self { path, data, border: Border::Clamp })
+                Ok(Self { path, data, border: Border::Clamp, world_from_voxels: None })
             }
         }
     }
 
-    fn check(&self, files: &CompileContext, file: Option<&str>, limit: f32) -> Result<()> {
+    fn checked(self, files: &CompileContext, file: Option<&str>, limit: f32) -> Result<Self> {
         let VolumeData { resolution: [nx, ny, _], channels, values } = &self.data;
-        let Some(bad) = values.iter().position(|value| !(0.0..=limit).contains(value)) else { return Ok(()) };
+        let Some(bad) = values.iter().position(|value| !(0.0..=limit).contains(value)) else { return Ok(self) };
         let voxel = bad / *channels as usize;
         let (nx, ny) = (*nx as usize, *ny as usize);
         let at = [voxel % nx, voxel / nx % ny, voxel / nx / ny];
@@ -139,16 +138,17 @@ impl Part {
         })
     }
 
-    fn numbers(self, files: &CompileContext) -> Result<VoxelGrid<f32>> {
-        let VolumeData { resolution, channels, values } = self.data;
-        if channels != 1 {
+    fn numbers(mut self, files: &CompileContext, place: &Placement) -> Result<VoxelGrid<f32>> {
+        if self.data.channels != 1 {
             return Err(files.error(&self.path, "needs one number a voxel, not a colour"));
         }
-        Ok(VoxelGrid::new(resolution, values, self.border))
+        let values = std::mem::take(&mut self.data.values);
+        Ok(self.grid(values, place))
     }
 
-    fn colors(self, files: &CompileContext) -> Result<VoxelGrid<Rgb>> {
-        let VolumeData { resolution, channels, values } = self.data;
+    fn colors(mut self, files: &CompileContext, place: &Placement) -> Result<VoxelGrid<Rgb>> {
+        let values = std::mem::take(&mut self.data.values);
+        let channels = self.data.channels;
         if !is_available(values.len() / channels as usize * size_of::<Rgb>()) {
             return Err(files.error(&self.path, "needs more memory than there is"));
         }
@@ -156,8 +156,24 @@ impl Part {
             1 => values.into_iter().map(Rgb::splat).collect(),
             _ => values.as_chunks().0.iter().map(|&value| Rgb::from(value)).collect(),
         };
-        Ok(VoxelGrid::new(resolution, values, self.border))
+        Ok(self.grid(values, place))
     }
+
+    fn grid<T: Voxel>(&self, values: Vec<T>, place: &Placement) -> VoxelGrid<T> {
+        match place.within_unit(self) {
+            Some([min, max]) => VoxelGrid::placed(self.data.resolution, values, min, max),
+            None => VoxelGrid::new(self.data.resolution, values, self.border),
+        }
+    }
+}
+
+fn has_extension(path: &Path, extensions: &[&str]) -> bool {
+    path.extension().is_some_and(|found| extensions.iter().any(|extension| found.eq_ignore_ascii_case(extension)))
+}
+
+/// Whether a file, and no volume that a reader made, is one of OpenVDB or NanoVDB.
+fn is_vdb(files: &CompileContext, name: &str) -> bool {
+    !files.source.assets.volumes.contains_key(name) && has_extension(Path::new(name), &["vdb", "nvdb"])
 }
 
 fn required(files: &CompileContext, path: &str, resolution: Option<[u32; 3]>) -> Result<[u32; 3]> {
@@ -175,12 +191,8 @@ fn read_file(
         return Ok(volume.clone());
     }
     let asset = files.source.asset(name);
-    let extension = asset.extension().map(std::ffi::OsStr::to_ascii_lowercase).unwrap_or_default();
-    let read = if extension == "vol" {
+    let read = if has_extension(&asset, &["vol"]) {
         read_vol(&asset)
-    } else if extension == "vdb" || extension == "nvdb" {
-        let message = "OpenVDB and NanoVDB files are not supported: convert the grid to a .vol file or plain floats";
-        return Err(files.error(&format!("{path}.file"), message));
     } else {
         read_raw_volume(&asset, required(files, path, resolution)?, channels.unwrap_or(1))
     };

@@ -35,9 +35,10 @@ pub struct MediumDesc {
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MediumVolumeDesc {
-    /// Two opposite corners of the box, `[[x, y, z], [x, y, z]]`. Default: the unit cube, from 0 to 1.
-    #[serde(default = "unit_cube")]
-    pub bounds: [[f64; 3]; 2],
+    /// Two opposite corners of the box, `[[x, y, z], [x, y, z]]`. Default: of grids of `.vdb` and `.nvdb` files, the
+    /// smallest box around them where these files place them; else the unit cube, from 0 to 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bounds: Option<[[f64; 3]; 2]>,
     /// Where the box is placed. Default: where its bounds are.
     #[serde(default, skip_serializing_if = "TransformDesc::is_empty")]
     pub transform: TransformDesc,
@@ -67,16 +68,7 @@ pub struct MediumVolumeDesc {
     pub temperature_scale: Option<f32>,
 }
 
-fn unit_cube() -> [[f64; 3]; 2] {
-    [[0.0; 3], [1.0; 3]]
-}
-
 impl MediumVolumeDesc {
-    /// The unit cube, in which nothing differs.
-    pub fn unit_cube() -> Self {
-        Self { bounds: unit_cube(), ..Self::default() }
-    }
-
     /// The volumes that are there, each with its key.
     pub fn parts_mut(&mut self) -> impl Iterator<Item = (&'static str, &mut VolumeDesc)> {
         let Self { density, albedo, absorption, scattering, emission, temperature, .. } = self;
@@ -100,21 +92,27 @@ impl MediumVolumeDesc {
 pub enum VolumeDesc {
     /// A grid of voxels.
     Grid {
-        /// A file, relative to the scene file: one of Mitsuba's volumes if its name ends with `.vol` (the box in its
-        /// header does not count), else nothing but little-endian 32-bit floats, by z, then y, then x, then channel:
-        /// the x of the voxel changes fastest. Either `file` or `values` must be given.
+        /// A file, relative to the scene file: of OpenVDB if its name ends with `.vdb`, of NanoVDB with `.nvdb`, one of
+        /// Mitsuba's volumes with `.vol` (the box in its header does not count), else nothing but little-endian 32-bit
+        /// floats, by z, then y, then x, then channel: the x of the voxel changes fastest. Either `file` or `values` must
+        /// be given.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         file: Option<String>,
+        /// The name of a grid of a `.vdb` or `.nvdb` file. Default: that of the key that the volume stands for, such as
+        /// `density`, if the file has such a grid; else its only one.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        grid: Option<String>,
         /// The values themselves, in the same order.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         values: Option<Vec<f32>>,
-        /// Voxels along x, y and z, each from 1 to 16384. Required but for `.vol` files.
+        /// Voxels along x, y and z, each from 1 to 16384. Required but for files that have their own.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         resolution: Option<[u32; 3]>,
-        /// 1 number a voxel, or 3: red, green and blue. Default: 1; of `.vol` files, theirs.
+        /// 1 number a voxel, or 3: red, green and blue. Default: 1, or what the file has.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         channels: Option<u32>,
-        /// What is between the middles of the outermost voxels and the faces of the box. Default: `clamp`.
+        /// What is between the middles of the outermost voxels and the faces of the box. Grids of `.vdb` and `.nvdb`
+        /// files have their background there. Default: `clamp`.
         #[serde(default, skip_serializing_if = "BorderDesc::is_clamp")]
         border: BorderDesc,
     },
@@ -149,13 +147,14 @@ pub enum VolumeDesc {
 impl VolumeDesc {
     /// The grid of a file that has its own resolution.
     pub fn of_file(file: String, border: BorderDesc) -> Self {
-        Self::Grid { file: Some(file), values: None, resolution: None, channels: None, border }
+        Self::Grid { file: Some(file), grid: None, values: None, resolution: None, channels: None, border }
     }
 
     /// The same value everywhere.
     pub fn constant(value: f32) -> Self {
         Self::Grid {
             file: None,
+            grid: None,
             values: Some(vec![value]),
             resolution: Some([1; 3]),
             channels: None,

@@ -4,7 +4,7 @@ use std::ops::{Add, Mul};
 
 use crate::color::Rgb;
 use crate::math::float::UNIT_ROUNDOFF;
-use crate::math::{Vec3, vec3};
+use crate::math::{DVec3, Vec3, vec3};
 
 /// What voxels hold.
 pub trait Voxel: Copy + Default + Send + Sync + Add<Output = Self> + Mul<f32, Output = Self> {
@@ -52,7 +52,7 @@ pub struct VoxelGrid<T> {
     values: Vec<T>,
     /// From the unit cube to numbers of voxels, whole at their middles.
     scale: Vec3,
-    offset: f32,
+    offset: Vec3,
 }
 
 /// The least and the largest of values.
@@ -71,7 +71,7 @@ impl<T: Voxel> VoxelGrid<T> {
         debug_assert_eq!(inner.iter().product::<usize>(), values.len());
         let scale = Vec3::from(resolution.map(|edge| edge as f32));
         if border == Border::Clamp {
-            return Self { resolution: inner, values, scale, offset: -0.5 };
+            return Self { resolution: inner, values, scale, offset: Vec3::splat(-0.5) };
         }
         let outer = inner.map(|edge| edge + 2);
         let mut padded = vec![T::default(); outer.iter().product()];
@@ -80,12 +80,20 @@ impl<T: Voxel> VoxelGrid<T> {
             let start = ((z + 1) * outer[1] + y + 1) * outer[0] + 1;
             padded[start..start + inner[0]].copy_from_slice(from);
         }
-        Self { resolution: outer, values: padded, scale, offset: 0.5 }
+        Self { resolution: outer, values: padded, scale, offset: Vec3::splat(0.5) }
     }
 
-    /// Voxels along x, y and z.
+    /// As [`new`](Self::new), for voxels that fill the box from `min` to `max` of the unit cube; beyond it, there are
+    /// the values of the outermost ones.
+    pub fn placed(resolution: [u32; 3], values: Vec<T>, min: DVec3, max: DVec3) -> Self {
+        let scale = DVec3::from(resolution.map(f64::from)) / (max - min);
+        let offset = (-min * scale - 0.5).as_vec3();
+        Self { scale: scale.as_vec3(), offset, ..Self::new(resolution, values, Border::Clamp) }
+    }
+
+    /// Voxels along x, y and z; of those that fill a part of the unit cube, as many as would fill all of it.
     pub fn resolution(&self) -> [usize; 3] {
-        self.resolution
+        [0, 1, 2].map(|axis| self.resolution[axis].max(self.scale[axis].ceil() as usize))
     }
 
     /// The value at a point of the unit cube.
@@ -93,14 +101,15 @@ impl<T: Voxel> VoxelGrid<T> {
     pub fn at(&self, p: Vec3) -> T {
         let [nx, ny, nz] = self.resolution;
         // A NaN becomes 0.
-        let place = |p: f32, scale: f32, n: usize| {
-            let x = (p * scale + self.offset).max(0.0).min((n - 1) as f32);
+        let place = |p: f32, scale: f32, offset: f32, n: usize| {
+            let x = (p * scale + offset).max(0.0).min((n - 1) as f32);
             let i = x as usize;
             (i, (i + 1).min(n - 1), x - i as f32)
         };
-        let (x0, x1, fx) = place(p.x, self.scale.x, nx);
-        let (y0, y1, fy) = place(p.y, self.scale.y, ny);
-        let (z0, z1, fz) = place(p.z, self.scale.z, nz);
+        let Self { scale, offset, .. } = self;
+        let (x0, x1, fx) = place(p.x, scale.x, offset.x, nx);
+        let (y0, y1, fy) = place(p.y, scale.y, offset.y, ny);
+        let (z0, z1, fz) = place(p.z, scale.z, offset.z, nz);
         let mix = |a: T, b: T, f: f32| a * (1.0 - f) + b * f;
         let row = |y: usize, z: usize| {
             let start = (z * ny + y) * nx;
@@ -113,10 +122,10 @@ impl<T: Voxel> VoxelGrid<T> {
     pub fn bounds(&self, min: Vec3, max: Vec3) -> Interval<T> {
         // A little wider, so that rounding leads out of no box.
         let range = |axis: usize| {
-            let (scale, last) = (self.scale[axis], self.resolution[axis] - 1);
-            let rounding = 8.0 * UNIT_ROUNDOFF as f32 * (scale + 1.0);
-            let low = (min[axis] * scale + self.offset - rounding).max(0.0) as usize;
-            let high = (max[axis] * scale + self.offset + rounding).max(0.0).ceil() as usize;
+            let (scale, offset, last) = (self.scale[axis], self.offset[axis], self.resolution[axis] - 1);
+            let rounding = 8.0 * UNIT_ROUNDOFF as f32 * (scale + offset.abs() + 1.0);
+            let low = (min[axis] * scale + offset - rounding).max(0.0) as usize;
+            let high = (max[axis] * scale + offset + rounding).max(0.0).ceil() as usize;
             low.min(last)..=high.min(last)
         };
         let [nx, ny, _] = self.resolution;

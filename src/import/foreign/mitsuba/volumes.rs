@@ -34,7 +34,7 @@ impl<'a> Reader<'a> {
             element.approximated("albedo", "fills the box of sigma_t");
         }
         let mut grids = Grids {
-            volume: MediumVolumeDesc { transform: steps(&map), ..MediumVolumeDesc::unit_cube() },
+            volume: MediumVolumeDesc { transform: steps(&map), ..MediumVolumeDesc::default() },
             has_extinction: extinction.is_some(),
             has_albedo: false,
         };

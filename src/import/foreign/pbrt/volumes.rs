@@ -53,7 +53,7 @@ impl MediumDirective<'_> {
             transform.0.extend(start.transform.0.iter().cloned());
         }
         let bounds = [corner("p0", 0.0)?, corner("p1", 1.0)?];
-        Ok(MediumVolumeDesc { bounds, transform, ..MediumVolumeDesc::default() })
+        Ok(MediumVolumeDesc { bounds: Some(bounds), transform, ..MediumVolumeDesc::default() })
     }
 
     /// The radiance of black bodies, whose largest over all wavelengths is the brightness, one number or one a voxel.

@@ -72,7 +72,7 @@ fn grids_become_volumes() {
     assert_eq!((medium.absorption.to_array(), medium.scattering.to_array()), ([2.0, 4.0, 6.0], [2.0; 3]));
     assert_eq!(medium.emission.to_array(), [2.0, 4.0, 12.0]);
     let volume = medium.volume.as_ref().unwrap();
-    assert_eq!(volume.bounds, [[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]]);
+    assert_eq!(volume.bounds, Some([[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]]));
     assert!(!volume.transform.is_empty());
     assert_eq!(found.assets.volumes[file(&volume.density)].values, [0.5, 7.0]);
     assert_eq!(found.assets.volumes[file(&volume.emission)].values, [3.0, 4.0]);
