@@ -6,11 +6,16 @@ use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
 use steradian::internal::assets;
-use steradian::internal::assets::MeshData;
+use steradian::internal::assets::{GridChoice, MeshData};
 use steradian::internal::config::{self, Trust};
 use steradian::internal::geometry::{CurveBasis, CurveKind, Curves, Strands};
 use steradian::internal::import::{self, ImportOptions};
 use steradian::internal::render::RenderProvenance;
+
+/// The most grids of a volume file that are read, and the most bytes of their voxels: a cube of one value takes few bytes
+/// of a file.
+const MOST_GRIDS: usize = 4;
+const MOST_VOXEL_BYTES: usize = 1 << 21;
 
 /// Reads `data` as a file of `kind`, which is the name of a target, in `folder`, which only this caller writes to.
 /// Malformed files are errors; anything else is a finding.
@@ -71,6 +76,18 @@ pub fn read(kind: &str, data: &[u8], folder: &Path) {
                 assert_eq!(assets::vol_bytes(&volume).len(), data.len());
             }
             let _ = assets::read_raw_volume(&path, [2, 2, 2], 1);
+        }
+        "vdb" => {
+            let path = write("v.vdb", data);
+            let listed = assets::list_vdb(&path).unwrap_or_default();
+            let names = listed.iter().take(MOST_GRIDS).map(|(name, _)| Some(name.as_str()));
+            for name in names.chain([None]) {
+                let choice = GridChoice { name, default: "density" };
+                let Ok(grid) = assets::read_vdb_within(&path, choice, MOST_VOXEL_BYTES) else { continue };
+                assert!(!listed.is_empty() && grid.world_from_voxels.is_finite());
+                let voxels: usize = grid.voxels.resolution.iter().map(|&edge| edge as usize).product();
+                assert_eq!(grid.voxels.values.len(), voxels * grid.voxels.channels as usize);
+            }
         }
         "mitsuba_xml" => read_scene(&write("s.xml", data)),
         "pbrt" => read_scene(&write("s.pbrt", data)),

@@ -256,6 +256,11 @@ impl Media {
         Self { volumes, ..self }
     }
 
+    /// Bytes of the voxels of all volumes.
+    pub fn voxel_bytes(&self) -> usize {
+        self.volumes.iter().map(Volume::voxel_bytes).sum()
+    }
+
     /// What differs within a medium, if anything does.
     #[inline]
     pub fn volume(&self, medium: &Medium) -> Option<&Volume> {

@@ -146,6 +146,13 @@ def several():
     return [first, second, heat]
 
 
+def fire():
+    """The smoke, and a temperature in a part of it."""
+    density, heat = smoke(), smoke("temperature", CENTRE + 2, 3)
+    heat.transform = density.transform
+    return [density, heat]
+
+
 def half(grid):
     grid.saveFloatAsHalf = True
     return grid
@@ -187,6 +194,7 @@ def main():
     write("colours.vdb", [colours()])
     write("turned.vdb", [turned()])
     write("several.vdb", several())
+    write("fire.vdb", fire())
     write("empty.vdb", [vdb.FloatGrid(0.0)])
     sphere = vdb.createLevelSetSphere(radius=3.0, center=(20, 20, 20), halfWidth=2.0)
     sphere.name = "surface"
@@ -208,7 +216,7 @@ def main():
     check(read("colours.vdb", "Cd"), are_colours, channels=3)
 
     convert = ["nanovdb_convert", "-f"]
-    for name in ["blosc", "tiles", "colours", "turned", "masks", "several"]:
+    for name in ["blosc", "tiles", "colours", "turned", "masks", "several", "fire"]:
         run(*convert, "-z", folder / f"{name}.vdb", folder / f"{name}_zip.nvdb")
     run(*convert, "-b", folder / "blosc.vdb", folder / "blosc.nvdb")
     for bits in ["fp4", "fp8", "fp16", "fpN"]:

@@ -29,7 +29,7 @@ pub use obj::{ObjMaterial, ObjMesh, read_obj};
 pub use ply::{read_ply, read_ply_attributes};
 pub use source::SceneSource;
 pub use strands::{StrandData, read_strands};
-pub use vdb::{GridChoice, VdbGrid, list_vdb, read_vdb, read_vdb_within};
+pub use vdb::{GridChoice, VDB_MAGICS, VdbGrid, list_vdb, read_vdb, read_vdb_within};
 pub use volume::{VolHeader, VolumeData, read_raw_volume, read_vol, read_vol_header, vol_bytes};
 
 use std::path::{Path, PathBuf};

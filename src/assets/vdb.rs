@@ -20,6 +20,9 @@ use cursor::Source;
 use dense::Dense;
 use list::Listed;
 
+/// What files of OpenVDB and NanoVDB begin with.
+pub const VDB_MAGICS: [[u8; 8]; 4] = [open::MAGIC, nano::MAGICS[0], nano::MAGICS[1], nano::MAGICS[2]];
+
 /// Why signed distances are not read.
 const LEVEL_SET: &str = "is a level set, distances from a surface: convert it to a fog volume";
 

@@ -150,6 +150,18 @@ impl VolumeDesc {
         Self::Grid { file: Some(file), grid: None, values: None, resolution: None, channels: None, border }
     }
 
+    /// A grid of a file of OpenVDB or NanoVDB.
+    pub fn of_vdb(file: String, grid: &str) -> Self {
+        Self::Grid {
+            file: Some(file),
+            grid: Some(grid.to_owned()),
+            values: None,
+            resolution: None,
+            channels: None,
+            border: BorderDesc::Clamp,
+        }
+    }
+
     /// The same value everywhere.
     pub fn constant(value: f32) -> Self {
         Self::Grid {

@@ -139,6 +139,19 @@ impl Volume {
         }
     }
 
+    /// Bytes of the voxels.
+    pub fn voxel_bytes(&self) -> usize {
+        let VolumeGrids { density, split, emission, temperature } = &self.grids;
+        let numbers = density.iter().chain(temperature).map(VoxelGrid::bytes);
+        let split = match split {
+            ExtinctionSplit::Even => [None, None],
+            ExtinctionSplit::Albedo(albedo) => [Some(albedo), None],
+            ExtinctionSplit::Factors { absorption, scattering } => [absorption.as_ref(), scattering.as_ref()],
+        };
+        let colors = split.into_iter().flatten().chain(emission).map(VoxelGrid::bytes);
+        numbers.chain(colors).sum()
+    }
+
     /// Moves a volume of the world to a render space.
     pub fn place(&mut self, space: &RenderSpace) {
         let factor = (1.0 / space.scale()) as f32;

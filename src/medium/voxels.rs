@@ -96,6 +96,11 @@ impl<T: Voxel> VoxelGrid<T> {
         [0, 1, 2].map(|axis| self.resolution[axis].max(self.scale[axis].ceil() as usize))
     }
 
+    /// Bytes of all values.
+    pub fn bytes(&self) -> usize {
+        self.values.len() * size_of::<T>()
+    }
+
     /// The value at a point of the unit cube.
     #[inline]
     pub fn at(&self, p: Vec3) -> T {

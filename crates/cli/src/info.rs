@@ -1,7 +1,10 @@
 //! `steradian info`.
 
-use serde_json::{Value, json};
+use std::path::Path;
+
+use serde_json::{Map, Value, json};
 use steradian::desc::{CameraKindDesc, SceneDesc};
+use steradian::internal::assets::{AssetError, list_vdb};
 use steradian::internal::compile;
 use steradian::internal::compile::Summary;
 use steradian::internal::render::{Overrides, Settings, film_bytes_per_pixel};
@@ -15,8 +18,13 @@ use crate::text;
 /// The file of a scene without outputs, which is never written.
 const UNUSED: &str = "unused.exr";
 
-/// Prints what is in a scene.
+/// Prints what is in a scene, or which grids a file of OpenVDB or NanoVDB has.
 pub fn run(arguments: &InfoArgs) -> Result<()> {
+    let extension = arguments.scene.extension().map(std::ffi::OsStr::to_ascii_lowercase);
+    if extension.is_some_and(|extension| extension == "vdb" || extension == "nvdb") {
+        let value = grids(&arguments.scene)?;
+        return if arguments.json { text::print_json(&value) } else { text::print(&text::outline(&value)) };
+    }
     let imported = scene::load(&arguments.scene, &arguments.import, arguments.verbosity)?;
     let scene = compile::compile_from(&imported.desc, imported.source(&arguments.scene))?;
     let overrides = Overrides { default_outputs: vec![UNUSED.into()], ..Overrides::default() };
@@ -26,6 +34,16 @@ pub fn run(arguments: &InfoArgs) -> Result<()> {
     value["camera"] = camera(&imported.desc, &scene);
     value["cost"] = cost(&scene, &settings);
     if arguments.json { text::print_json(&value) } else { text::print(&for_people(value)) }
+}
+
+/// The grids of a file with the types of their values.
+fn grids(file: &Path) -> Result<Value> {
+    let grids = list_vdb(file).map_err(|error| match error {
+        AssetError::Missing { file, message } => Error::Missing { file, message },
+        AssetError::Malformed(message) => Error::Malformed { file: file.into(), message },
+    })?;
+    let grids: Map<String, Value> = grids.into_iter().map(|(name, kind)| (name, kind.into())).collect();
+    Ok(json!({ "grids": grids }))
 }
 
 /// Size, samples and algorithm of a render without options.
@@ -72,6 +90,7 @@ fn cost(scene: &Scene, settings: &Settings) -> Value {
     json!({
         "camera_rays": pixels * u64::from(settings.spp),
         "geometry_bytes": scene.geometry.memory_bytes(),
+        "voxel_bytes": scene.media.voxel_bytes(),
         "film_bytes": pixels * film_bytes_per_pixel(scene, settings) as u64,
     })
 }
@@ -104,11 +123,16 @@ fn for_people(mut value: Value) -> String {
     }
     let cost = &value["cost"];
     let number = |key: &str| cost[key].as_u64().unwrap_or(0);
-    value["cost"] = json!({
+    let voxels = number("voxel_bytes");
+    let mut cost = json!({
         "camera_rays": scaled(number("camera_rays"), ["", " thousand", " million", " billion"]),
         "geometry": scaled(number("geometry_bytes"), [" bytes", " kB", " MB", " GB"]),
         "film": scaled(number("film_bytes"), [" bytes", " kB", " MB", " GB"]),
     });
+    if voxels > 0 {
+        cost["voxels"] = scaled(voxels, [" bytes", " kB", " MB", " GB"]).into();
+    }
+    value["cost"] = cost;
     let [picture, camera, cost] = ["picture", "camera", "cost"].map(|key| {
         let section = value.as_object_mut().and_then(|map| map.remove(key));
         json!({ key: section })

@@ -107,8 +107,8 @@ pub enum Command {
     /// Check a scene and print what is in it and what it will cost
     ///
     /// Loads the scene with everything it names and prints size, samples, camera, bounds, counts, features, the number
-    /// of camera rays and the memory of geometry and film. A scene that has info without an error renders without an
-    /// error.
+    /// of camera rays and the memory of geometry, voxels and film. A scene that has info without an error renders
+    /// without an error. Of a .vdb or .nvdb file, prints the names and types of its grids.
     Info(InfoArgs),
     /// Turn a scene of another renderer into the JSON format, with its meshes and images beside it
     #[command(after_help = import::CONVERT_EXAMPLES)]
@@ -374,7 +374,7 @@ pub struct Verbosity {
 /// Arguments of `info`.
 #[derive(Debug, Args)]
 pub struct InfoArgs {
-    /// The scene file: .json, .xml (Mitsuba 3), .pbrt (pbrt-v4), .gltf or .glb
+    /// The scene file: .json, .xml (Mitsuba 3), .pbrt (pbrt-v4), .gltf or .glb; or a .vdb or .nvdb file
     pub scene: PathBuf,
     /// Print JSON
     #[arg(long)]

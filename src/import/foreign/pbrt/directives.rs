@@ -221,7 +221,8 @@ impl Reader {
                     params.with_defaults(self.graphics.attributes.get("medium").map_or(&[][..], Vec::as_slice));
                 let colors = Colors { folder: &self.folder, space: self.graphics.color_space };
                 let (transform, motion) = self.world.place(&self.graphics.ctm, crate::math::DAffine3::IDENTITY);
-                let medium = MediumDirective { name: &name, params: &params, colors: &colors, transform, motion };
+                let (name, params, scene) = (&*name, &params, &*self.scene);
+                let medium = MediumDirective { name, params, colors: &colors, scene, transform, motion };
                 self.media.define(&mut self.draft, &medium)?;
             }
             "Material" | "MakeNamedMaterial" | "NamedMaterial" => self.material(lexer, at, directive)?,

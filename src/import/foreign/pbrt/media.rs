@@ -1,6 +1,7 @@
 //! Participating media.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 use super::colors::{Colors, Meaning};
 use super::directives::quoted;
@@ -39,6 +40,8 @@ pub struct MediumDirective<'a> {
     pub name: &'a str,
     pub params: &'a Params,
     pub colors: &'a Colors<'a>,
+    /// The file of the scene.
+    pub scene: &'a Path,
     /// Of the medium's own space.
     pub transform: TransformDesc,
     pub motion: Vec<KeyframeDesc>,
@@ -63,14 +66,8 @@ impl MediumTable {
     pub fn define(&mut self, draft: &mut Draft, medium: &MediumDirective) -> Result<()> {
         let MediumDirective { name, params, colors, .. } = *medium;
         let kind = params.string("type")?.unwrap_or("homogeneous");
-        if !matches!(kind, "homogeneous" | "uniformgrid" | "rgbgrid") {
-            let why = match kind {
-                "nanovdb" => {
-                    "NanoVDB files are not supported: left out; convert the grid to plain floats and give the medium a \
-                     `volume` with that file"
-                }
-                _ => "only homogeneous media, uniformgrid and rgbgrid are supported: left out",
-            };
+        if !matches!(kind, "homogeneous" | "uniformgrid" | "rgbgrid" | "nanovdb") {
+            let why = "only homogeneous media, uniformgrid, rgbgrid and nanovdb are supported: left out";
             draft.ignored(&params.place, &params.element, "", why);
             self.names.insert(name.into(), None);
             return Ok(());
@@ -87,6 +84,7 @@ impl MediumTable {
         let volume = match kind {
             "uniformgrid" => Some(medium.uniform_grid(draft)?),
             "rgbgrid" => Some(medium.rgb_grid(draft)?),
+            "nanovdb" => Some(medium.nano_grid(draft)?),
             _ => None,
         };
         if preset.is_none() {
@@ -96,7 +94,8 @@ impl MediumTable {
         let brightness = if is_grid { 1.0 } else { params.number_or("Lescale", 1.0)? as f32 };
         let radiance = if is_rgb_grid { None } else { colors.get(params, "Le", Meaning::Emission)? };
         // Black bodies have a colour of their own.
-        let glows = kind == "uniformgrid" && params.has("temperature");
+        let has_heat = volume.as_ref().is_some_and(|volume| volume.emission.is_some());
+        let glows = kind == "uniformgrid" && params.has("temperature") || kind == "nanovdb" && has_heat;
         let radiance = if glows { [1.0; 3] } else { radiance.unwrap_or([0.0; 3]) };
         let emission = [0, 1, 2].map(|i| radiance[i].max(0.0) * brightness * absorption[i]);
         let g = params.number_or("g", 0.0)?;

@@ -3,14 +3,18 @@
 use std::collections::BTreeMap;
 
 use super::media::MediumDirective;
-use crate::assets::VolumeData;
-use crate::desc::{BorderDesc, MediumVolumeDesc, VolumeDesc};
+use crate::assets::{AssetError, GridChoice, VdbGrid, VolumeData, list_vdb, read_vdb};
+use crate::desc::{BorderDesc, MediumVolumeDesc, TransformDesc, VolumeDesc};
 use crate::error::Result;
 use crate::import::foreign::Draft;
+use crate::math::{DAffine3, DVec3};
 use crate::spectrum::Spectrum;
 
 /// The largest temperature, in kelvin.
 const MAX_TEMPERATURE: f64 = 1e5;
+
+/// How far, in voxels, grids may lie apart that count as of the same voxels.
+const MAX_SHIFT: f64 = 1e-3;
 
 impl MediumDirective<'_> {
     /// What differs within a `uniformgrid`: its density, and the brightness of what it emits.
@@ -25,7 +29,9 @@ impl MediumDirective<'_> {
         let emission = match (params.groups::<1>("temperature")?, brightness.as_deref()) {
             (Some(temperatures), brightness) => {
                 params.approximate("temperature", "colours at the voxels, which are interpolated");
-                self.glow(draft, &temperatures, brightness.unwrap_or(&[[1.0]]))?
+                let offset = params.number_or("temperatureoffset", 0.0)?;
+                let values = self.glow(&temperatures, brightness.unwrap_or(&[[1.0]]), offset)?;
+                self.stored::<3>(draft, "temperature", values)?
             }
             (None, Some(&[[scale]])) => Some(VolumeDesc::constant(scale.max(0.0))),
             (None, _) => self.grid::<1>(draft, "Lescale")?,
@@ -44,27 +50,87 @@ impl MediumDirective<'_> {
         Ok(MediumVolumeDesc { absorption, scattering, ..self.placed()? })
     }
 
+    /// What differs within a `nanovdb` medium: the grids `density` and, if there is one, `temperature` of a file.
+    pub(super) fn nano_grid(&self, draft: &mut Draft) -> Result<MediumVolumeDesc> {
+        let params = self.params;
+        let Some(file) = params.string("filename")? else { return Err(params.error("needs a filename")) };
+        let path = self.colors.folder.join(file);
+        let place = format!("{}: {}", params.place, params.element);
+        let error = |error: AssetError| error.at(self.scene, &place, &path);
+        let has_heat = list_vdb(&path).map_err(error)?.iter().any(|(name, _)| name == "temperature");
+        let emission = if has_heat {
+            let read = |name| read_vdb(&path, GridChoice { name: Some(name), default: name }).map_err(error);
+            self.heat(draft, &read("density")?, &read("temperature")?)?
+        } else {
+            let why = "the file has no grid named \"temperature\"";
+            for name in ["Lescale", "temperaturescale", "temperatureoffset", "temperaturecutoff"] {
+                params.ignore(name, why);
+            }
+            None
+        };
+        let density = VolumeDesc::of_vdb(file.to_owned(), "density");
+        Ok(MediumVolumeDesc { density: Some(density), emission, transform: self.own_transform(), ..Default::default() })
+    }
+
+    /// The radiance of black bodies at the voxels of `density`.
+    fn heat(&self, draft: &mut Draft, density: &VdbGrid, heat: &VdbGrid) -> Result<Option<VolumeDesc>> {
+        let params = self.params;
+        let shift = DVec3::from([0, 1, 2].map(|axis| (heat.origin[axis] - density.origin[axis]) as f64));
+        let map = density.world_from_voxels.inverse() * heat.world_from_voxels;
+        if !map.abs_diff_eq(DAffine3::from_translation(shift), MAX_SHIFT) || heat.voxels.channels != 1 {
+            let why = "the grid has no numbers at the same places as the density: nothing is emitted";
+            draft.ignored(&params.place, &params.element, "temperature", why);
+            return Ok(None);
+        }
+        // Beyond its box, a grid has the background of its outermost voxels.
+        let [nx, ny, nz] = density.voxels.resolution.map(i64::from);
+        let value = |i: i64| {
+            let at = [i % nx, i / nx % ny, i / nx / ny];
+            let inside = [0, 1, 2].map(|axis| {
+                let last = i64::from(heat.voxels.resolution[axis]) - 1;
+                (at[axis] + density.origin[axis] - heat.origin[axis]).clamp(0, last) as usize
+            });
+            let [width, height, _] = heat.voxels.resolution.map(|edge| edge as usize);
+            [heat.voxels.values[(inside[2] * height + inside[1]) * width + inside[0]]]
+        };
+        let temperatures: Vec<[f32; 1]> = (0..nx * ny * nz).map(value).collect();
+        let offset = match params.number("temperatureoffset")? {
+            Some(offset) => offset,
+            None => params.number_or("temperaturecutoff", 0.0)?,
+        };
+        let brightness = params.number_or("Lescale", 1.0)? as f32;
+        draft.approximated(
+            &params.place,
+            &params.element,
+            "temperature",
+            "colours at the voxels of the density, which are interpolated",
+        );
+        let values = self.glow(&temperatures, &[[brightness]], offset)?;
+        let data = VolumeData::new(density.voxels.resolution, 3, values).map_err(|message| params.error(message))?;
+        let file = draft.keep_volume(&format!("{}_temperature", self.name), data);
+        Ok(Some(VolumeDesc::of_file(file, BorderDesc::Clamp)))
+    }
+
     /// The box.
     fn placed(&self) -> Result<MediumVolumeDesc> {
         let corner = |name: &str, default: f64| Ok(self.params.array(name)?.unwrap_or([default; 3]));
+        let bounds = [corner("p0", 0.0)?, corner("p1", 1.0)?];
+        Ok(MediumVolumeDesc { bounds: Some(bounds), transform: self.own_transform(), ..MediumVolumeDesc::default() })
+    }
+
+    /// The place of the medium's own space.
+    fn own_transform(&self) -> TransformDesc {
         let mut transform = self.transform.clone();
         if let Some(start) = self.motion.first() {
             self.params.approximate("type", "media do not move: placed as when the shutter opens");
             transform.0.extend(start.transform.0.iter().cloned());
         }
-        let bounds = [corner("p0", 0.0)?, corner("p1", 1.0)?];
-        Ok(MediumVolumeDesc { bounds: Some(bounds), transform, ..MediumVolumeDesc::default() })
+        transform
     }
 
     /// The radiance of black bodies, whose largest over all wavelengths is the brightness, one number or one a voxel.
-    fn glow(
-        &self,
-        draft: &mut Draft,
-        temperatures: &[[f32; 1]],
-        brightness: &[[f32; 1]],
-    ) -> Result<Option<VolumeDesc>> {
-        let (scale, offset) =
-            (self.params.number_or("temperaturescale", 1.0)?, self.params.number_or("temperatureoffset", 0.0)?);
+    fn glow(&self, temperatures: &[[f32; 1]], brightness: &[[f32; 1]], offset: f64) -> Result<Vec<f32>> {
+        let scale = self.params.number_or("temperaturescale", 1.0)?;
         if brightness.len() != 1 && brightness.len() != temperatures.len() {
             return Err(self.params.error("\"Lescale\" must have one value, or as many as \"temperature\""));
         }
@@ -83,7 +149,7 @@ impl MediumDirective<'_> {
             };
             values.extend(color.map(|c| (c * brightness).max(0.0)));
         }
-        self.stored::<3>(draft, "temperature", values)
+        Ok(values)
     }
 
     /// The grid of a parameter, of `N` numbers a voxel.
