@@ -146,3 +146,5 @@ mod view;
 mod views;
 /// Files of OpenVDB and NanoVDB.
 mod volume_files;
+/// Scenes with such files.
+mod volume_scenes;
