@@ -74,7 +74,7 @@ fn places(grid: &VdbGrid) -> impl Iterator<Item = [i64; 3]> {
     (0..nx * ny * nz).map(at)
 }
 
-/// The box of the smoke and one voxel around it, each of whose voxels is at most `tolerance` away from what is expected.
+/// The box of the smoke and one voxel around it, whose voxels are at most `tolerance` away from what is expected.
 #[track_caller]
 fn assert_smoke(name: &str, grid: &VdbGrid, tolerance: f32) {
     assert_eq!((grid.origin, grid.voxels.resolution, grid.voxels.channels), ([-22, -30, -21], [21; 3], 1), "{name}");

@@ -67,7 +67,7 @@ pub struct RootTile {
 }
 
 /// A node between root and leaves: a cube of children and of cubes of one value, `1 << log2` along each edge.
-pub struct Node<'a, B> {
+pub struct TreeNode<'a, B> {
     pub origin: [i64; 3],
     pub log2: u32,
     pub children: Mask<'a>,
@@ -75,7 +75,7 @@ pub struct Node<'a, B> {
     pub block: B,
 }
 
-impl<B> Node<'_, B> {
+impl<B> TreeNode<'_, B> {
     /// The cube of a child, or of one value.
     pub fn area(&self, i: usize) -> IndexBox {
         let edge = if self.log2 == UPPER_LOG2 { LEAF_EDGE << LOWER_LOG2 } else { LEAF_EDGE };
@@ -118,7 +118,7 @@ pub struct Topology<'a, B> {
     /// Of a voxel that is nowhere in the tree.
     pub background: Value,
     pub tiles: Vec<RootTile>,
-    pub nodes: Vec<Node<'a, B>>,
+    pub nodes: Vec<TreeNode<'a, B>>,
     pub leaves: Vec<Leaf<'a, B>>,
 }
 

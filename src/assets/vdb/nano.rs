@@ -4,7 +4,7 @@
 use super::codec::{Codec, Decoder, most_decompressed};
 use super::cursor::{Cursor, Source};
 use super::list::{Listed, choose};
-use super::nano_tree::{Layout, read_tree};
+use super::nano_tree::{NanoLayout, read_tree};
 use super::{GridChoice, VdbGrid};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::memory::is_available;
@@ -233,7 +233,7 @@ pub fn read(source: &mut Source, choice: GridChoice, most_bytes: usize) -> Resul
         return Err(named(super::LEVEL_SET.into()));
     }
     super::check_transform(&head.world_from_index).map_err(named)?;
-    let layout = Layout::new(head.kind).ok_or_else(|| {
+    let layout = NanoLayout::new(head.kind).ok_or_else(|| {
         let kind = kind_name(head.kind);
         named(format!("is of type {kind}, only float, double, vec3f, vec3d, fp4, fp8, fp16 and fpN are supported"))
     })?;

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use super::cursor::{Cursor, Mask};
 use super::dense::{
-    BlockFormat, IndexBox, LEAF_VALUES, LOWER_LOG2, Leaf, Node, ROOT_EDGE, RootTile, Topology, UPPER_LOG2, Value,
+    BlockFormat, IndexBox, LEAF_VALUES, LOWER_LOG2, Leaf, ROOT_EDGE, RootTile, Topology, TreeNode, UPPER_LOG2, Value,
 };
 use super::nano::GRID_HEAD;
 
@@ -28,14 +28,14 @@ enum LeafKind {
 
 /// Sizes of what a tree consists of.
 #[derive(Clone, Copy, Debug)]
-pub struct Layout {
+pub struct NanoLayout {
     channels: usize,
     number_bytes: usize,
     leaf: LeafKind,
 }
 
 /// The values of a node or leaf.
-pub struct Block<'a> {
+pub struct NanoBlock<'a> {
     /// Of a node: its table; of a leaf: all of it.
     bytes: &'a [u8],
     is_leaf: bool,
@@ -46,7 +46,7 @@ fn aligned(offset: usize, to: usize) -> usize {
     offset.next_multiple_of(to)
 }
 
-impl Layout {
+impl NanoLayout {
     /// Of the type of a grid, by its number.
     pub fn new(kind: u32) -> Option<Self> {
         let (number_bytes, channels, leaf) = match kind {
@@ -115,11 +115,11 @@ impl Layout {
 /// number is multiplied with, and statistics.
 const CODES: usize = 96;
 
-impl BlockFormat<Block<'_>> for Layout {
+impl BlockFormat<NanoBlock<'_>> for NanoLayout {
     type Scratch = ();
 
-    fn read(&self, block: &Block, _: Mask, (): &mut (), out: &mut [f32]) -> Result<(), String> {
-        let Block { bytes, is_leaf } = *block;
+    fn read(&self, block: &NanoBlock, _: Mask, (): &mut (), out: &mut [f32]) -> Result<(), String> {
+        let NanoBlock { bytes, is_leaf } = *block;
         if !is_leaf {
             let entries = bytes.chunks_exact(self.entry_bytes());
             entries.zip(out.chunks_exact_mut(self.channels)).for_each(|(entry, voxel)| self.numbers(entry, voxel));
@@ -149,13 +149,13 @@ impl BlockFormat<Block<'_>> for Layout {
 
 /// The bytes of a grid, and how many of them nodes may still take.
 struct Walk<'a> {
-    layout: Layout,
+    layout: NanoLayout,
     bytes: &'a [u8],
     left: usize,
 }
 
 /// Reads the tree of a grid.
-pub fn read_tree<'a>(layout: &Layout, bytes: &'a [u8]) -> Result<Topology<'a, Block<'a>>, String> {
+pub fn read_tree<'a>(layout: &NanoLayout, bytes: &'a [u8]) -> Result<Topology<'a, NanoBlock<'a>>, String> {
     let mut walk = Walk { layout: *layout, bytes, left: bytes.len() };
     let mut root_offset = Cursor::new(bytes.get(GRID_HEAD + ROOT_OFFSET..).ok_or("ends before its tree")?);
     let root = walk.offset(GRID_HEAD, root_offset.i64()?)?;
@@ -209,7 +209,12 @@ impl<'a> Walk<'a> {
     }
 
     /// A node without its children, and the places of these.
-    fn node(&mut self, at: usize, origin: [i64; 3], log2: u32) -> Result<(Node<'a, Block<'a>>, Vec<usize>), String> {
+    fn node(
+        &mut self,
+        at: usize,
+        origin: [i64; 3],
+        log2: u32,
+    ) -> Result<(TreeNode<'a, NanoBlock<'a>>, Vec<usize>), String> {
         let count = 1 << (3 * log2);
         let entry = self.layout.entry_bytes();
         let table = self.layout.behind_statistics(NODE_BOX + 2 * count / 8);
@@ -222,10 +227,10 @@ impl<'a> Walk<'a> {
             self.offset(at, offset)
         });
         let places = places.collect::<Result<_, _>>()?;
-        Ok((Node { origin, log2, children, active, block: Block { bytes: table, is_leaf: false } }, places))
+        Ok((TreeNode { origin, log2, children, active, block: NanoBlock { bytes: table, is_leaf: false } }, places))
     }
 
-    fn upper(&mut self, tree: &mut Topology<'a, Block<'a>>, at: usize, origin: [i64; 3]) -> Result<(), String> {
+    fn upper(&mut self, tree: &mut Topology<'a, NanoBlock<'a>>, at: usize, origin: [i64; 3]) -> Result<(), String> {
         let (upper, places) = self.node(at, origin, UPPER_LOG2)?;
         for (i, at) in upper.children.ones().zip(places) {
             let (lower, places) = self.node(at, upper.area(i).min, LOWER_LOG2)?;
@@ -239,11 +244,11 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    fn leaf(&mut self, at: usize, origin: [i64; 3]) -> Result<Leaf<'a, Block<'a>>, String> {
+    fn leaf(&mut self, at: usize, origin: [i64; 3]) -> Result<Leaf<'a, NanoBlock<'a>>, String> {
         let flags = self.bytes.get(at + LEAF_BOX - 1).ok_or("ends early in a leaf")?;
         let (_, size) = self.layout.leaf_size(*flags);
         let bytes = self.take(at, size)?;
         let active = Mask(&bytes[LEAF_BOX..LEAF_BOX + LEAF_VALUES / 8]);
-        Ok(Leaf { origin, active, block: Block { bytes, is_leaf: true } })
+        Ok(Leaf { origin, active, block: NanoBlock { bytes, is_leaf: true } })
     }
 }

@@ -4,7 +4,7 @@
 use super::codec::Codec;
 use super::cursor::{Cursor, Source};
 use super::list::{Listed, choose};
-use super::open_tree::{Layout, read_tree};
+use super::open_tree::{OpenLayout, read_tree};
 use super::{GridChoice, VdbGrid};
 use crate::math::{DAffine3, DMat3, DVec3};
 
@@ -76,7 +76,7 @@ fn header(cursor: &mut Cursor) -> Result<i32, String> {
         let [first, last] = VERSIONS;
         return Err(format!(
             "version {version} of the OpenVDB format is not supported, only {first} to {last}: write the file again \
-             with OpenVDB 3 or later"
+             with a current OpenVDB"
         ));
     }
     let in_header = |e| format!("the header {e}");
@@ -117,7 +117,7 @@ fn descriptor(cursor: &mut Cursor) -> Result<Descriptor, String> {
 
 /// What stands before a grid's tree.
 struct GridHead {
-    layout: Layout,
+    layout: OpenLayout,
     world_from_index: DAffine3,
 }
 
@@ -139,7 +139,7 @@ impl GridHead {
         if class == b"level set" {
             return Err(super::LEVEL_SET.into());
         }
-        let layout = Layout::new(&grid.kind, is_half, codec, flags & 2 != 0)?;
+        let layout = OpenLayout::new(&grid.kind, is_half, codec, flags & 2 != 0)?;
         Ok(Self { layout, world_from_index: transform(cursor)? })
     }
 }

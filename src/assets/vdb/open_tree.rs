@@ -8,11 +8,11 @@ use half::f16;
 use super::codec::{Codec, Decoder};
 use super::cursor::{Cursor, Mask};
 use super::dense::{
-    BlockFormat, IndexBox, LEAF_VALUES, LOWER_LOG2, Leaf, Node, ROOT_EDGE, RootTile, Topology, UPPER_LOG2, Value,
+    BlockFormat, IndexBox, LEAF_VALUES, LOWER_LOG2, Leaf, ROOT_EDGE, RootTile, Topology, TreeNode, UPPER_LOG2, Value,
 };
 
 /// How the values of a grid are stored.
-pub struct Layout {
+pub struct OpenLayout {
     channels: usize,
     /// Bytes of a number, but in lists of halves.
     number_bytes: usize,
@@ -33,7 +33,7 @@ pub struct Stored<'a> {
     selection: Option<Mask<'a>>,
 }
 
-impl Layout {
+impl OpenLayout {
     /// Of a type of grid.
     pub fn new(kind: &str, is_half: bool, codec: Codec, has_masks: bool) -> Result<Self, String> {
         let (number_bytes, channels) = match kind {
@@ -121,7 +121,7 @@ pub struct Scratch {
     values: Vec<f32>,
 }
 
-impl BlockFormat<Stored<'_>> for Layout {
+impl BlockFormat<Stored<'_>> for OpenLayout {
     type Scratch = Scratch;
 
     fn read(&self, block: &Stored, active: Mask, scratch: &mut Scratch, out: &mut [f32]) -> Result<(), String> {
@@ -153,7 +153,7 @@ impl BlockFormat<Stored<'_>> for Layout {
 }
 
 /// Reads a tree.
-pub fn read_tree<'a>(layout: &Layout, cursor: &mut Cursor<'a>) -> Result<Topology<'a, Stored<'a>>, String> {
+pub fn read_tree<'a>(layout: &OpenLayout, cursor: &mut Cursor<'a>) -> Result<Topology<'a, Stored<'a>>, String> {
     let buffers = cursor.u32()?;
     if buffers != 1 {
         return Err(format!("has {buffers} buffers a voxel, only 1 is supported"));
@@ -204,14 +204,14 @@ fn root_place(cursor: &mut Cursor, places: &mut BTreeSet<[i64; 3]>) -> Result<[i
 
 /// A node by its first voxel and its children along each edge.
 fn node<'a>(
-    layout: &Layout,
+    layout: &OpenLayout,
     cursor: &mut Cursor<'a>,
     background: Value,
     origin: [i64; 3],
     log2: u32,
-) -> Result<Node<'a, Stored<'a>>, String> {
+) -> Result<TreeNode<'a, Stored<'a>>, String> {
     let count = 1 << (3 * log2);
     let (children, active) = (Mask(cursor.take(count / 8)?), Mask(cursor.take(count / 8)?));
     let block = layout.stored(cursor, active, count, background)?;
-    Ok(Node { origin, log2, children, active, block })
+    Ok(TreeNode { origin, log2, children, active, block })
 }
