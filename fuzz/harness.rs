@@ -12,8 +12,8 @@ use steradian::internal::geometry::{CurveBasis, CurveKind, Curves, Strands};
 use steradian::internal::import::{self, ImportOptions};
 use steradian::internal::render::RenderProvenance;
 
-/// The most grids of a volume file that are read, and the most bytes of their voxels: a cube of one value takes few bytes
-/// of a file.
+/// The most grids of a volume file that are read, and the most bytes of their voxels: a cube of one value takes few
+/// bytes of a file.
 const MOST_GRIDS: usize = 4;
 const MOST_VOXEL_BYTES: usize = 1 << 21;
 

@@ -182,7 +182,9 @@ fn nanovdb_media_of_pbrt_have_density_and_temperature() {
         let is_inside = q.iter().all(|x| (0..9).contains(x));
         let number = if is_inside { ((q[2] * 9 + q[1]) * 9 + q[0]) as usize } else { 0 };
         let kelvin = (heat.voxels.values[number] - 0.25) * 4000.0;
-        assert_eq!(color[0] > 0.0, kelvin > 100.0, "{p:?} {kelvin} {color:?}");
+        // Up to 100 K nothing is emitted, and little more than that is nothing in `f32`.
+        assert!(color[0] == 0.0 || kelvin > 100.0, "{p:?} {kelvin} {color:?}");
+        assert!(color[0] > 0.0 || kelvin < 500.0, "{p:?} {kelvin} {color:?}");
         assert!(color.iter().all(|c| *c <= 2.5), "{color:?}");
         bright += usize::from(color[0] > 0.0);
     }

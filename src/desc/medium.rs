@@ -94,8 +94,8 @@ pub enum VolumeDesc {
     Grid {
         /// A file, relative to the scene file: of OpenVDB if its name ends with `.vdb`, of NanoVDB with `.nvdb`, one of
         /// Mitsuba's volumes with `.vol` (the box in its header does not count), else nothing but little-endian 32-bit
-        /// floats, by z, then y, then x, then channel: the x of the voxel changes fastest. Either `file` or `values` must
-        /// be given.
+        /// floats, by z, then y, then x, then channel: the x of the voxel changes fastest. Either `file` or `values`
+        /// must be given.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         file: Option<String>,
         /// The name of a grid of a `.vdb` or `.nvdb` file. Default: that of the key that the volume stands for, such as

@@ -106,8 +106,8 @@ impl Source {
         Ok(bytes)
     }
 
-    /// What `parse` makes of the bytes from `start`, and where it ended. It is tried with more of them, up to the end of
-    /// the file, until it succeeds.
+    /// What `parse` makes of the bytes from `start`, and where it ended. It is tried with more of them, up to the end
+    /// of the file, until it succeeds.
     pub fn parse<T>(
         &mut self,
         start: u64,

@@ -23,7 +23,7 @@ pub const ROOT_EDGE: i64 = LEAF_EDGE << (LOWER_LOG2 + UPPER_LOG2);
 const MAX_EDGE: i64 = 1 << 14;
 
 /// One number for each channel; those of channels that a grid does not have are 0.
-pub type Value = [f32; 3];
+pub type VoxelValue = [f32; 3];
 
 /// Index coordinates of voxels, those of both corners included.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,7 +63,7 @@ impl IndexBox {
 pub struct RootTile {
     pub area: IndexBox,
     pub is_active: bool,
-    pub value: Value,
+    pub value: VoxelValue,
 }
 
 /// A node between root and leaves: a cube of children and of cubes of one value, `1 << log2` along each edge.
@@ -116,7 +116,7 @@ pub struct Topology<'a, B> {
     /// Numbers of each voxel: 1 or 3.
     pub channels: usize,
     /// Of a voxel that is nowhere in the tree.
-    pub background: Value,
+    pub background: VoxelValue,
     pub tiles: Vec<RootTile>,
     pub nodes: Vec<TreeNode<'a, B>>,
     pub leaves: Vec<Leaf<'a, B>>,

@@ -1,5 +1,5 @@
-//! NanoVDB files, whose format is that of `nanovdb/NanoVDB.h` and `nanovdb/io/IO.h`, version 32: segments, each a header,
-//! descriptions of grids and their bytes, compressed or not; or nothing but the bytes of grids.
+//! NanoVDB files, whose format is that of `nanovdb/NanoVDB.h` and `nanovdb/io/IO.h`, version 32: segments, each a
+//! header, descriptions of grids and their bytes, compressed or not; or nothing but the bytes of grids.
 
 use super::codec::{Codec, Decoder, most_decompressed};
 use super::cursor::{Cursor, Source};

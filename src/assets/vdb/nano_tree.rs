@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 
 use super::cursor::{Cursor, Mask};
 use super::dense::{
-    BlockFormat, IndexBox, LEAF_VALUES, LOWER_LOG2, Leaf, ROOT_EDGE, RootTile, Topology, TreeNode, UPPER_LOG2, Value,
+    BlockFormat, IndexBox, LEAF_VALUES, LOWER_LOG2, Leaf, ROOT_EDGE, RootTile, Topology, TreeNode, UPPER_LOG2,
+    VoxelValue,
 };
 use super::nano::GRID_HEAD;
 
@@ -83,8 +84,8 @@ impl NanoLayout {
         aligned(extremes + 2 * self.number_bytes, 32)
     }
 
-    fn value(&self, bytes: &[u8]) -> Value {
-        let mut value = Value::default();
+    fn value(&self, bytes: &[u8]) -> VoxelValue {
+        let mut value = VoxelValue::default();
         self.numbers(bytes, &mut value[..self.channels]);
         value
     }

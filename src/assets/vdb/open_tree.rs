@@ -1,5 +1,5 @@
-//! The tree of a grid of an OpenVDB file: a root with nodes of 32³ children, which are nodes of 16³ leaves of 8³ voxels.
-//! First stand the masks of all, with the values of cubes that are of one value, then the voxels of the leaves.
+//! The tree of a grid of an OpenVDB file: a root with nodes of 32³ children, which are nodes of 16³ leaves of 8³
+//! voxels. First stand the masks of all, with the values of cubes that are of one value, then the voxels of the leaves.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,8 @@ use half::f16;
 use super::codec::{Codec, Decoder};
 use super::cursor::{Cursor, Mask};
 use super::dense::{
-    BlockFormat, IndexBox, LEAF_VALUES, LOWER_LOG2, Leaf, ROOT_EDGE, RootTile, Topology, TreeNode, UPPER_LOG2, Value,
+    BlockFormat, IndexBox, LEAF_VALUES, LOWER_LOG2, Leaf, ROOT_EDGE, RootTile, Topology, TreeNode, UPPER_LOG2,
+    VoxelValue,
 };
 
 /// How the values of a grid are stored.
@@ -29,7 +30,7 @@ pub struct Stored<'a> {
     /// How many values there are.
     count: usize,
     /// What inactive voxels have that are left out: those of the mask the second, others the first.
-    inactive: [Value; 2],
+    inactive: [VoxelValue; 2],
     selection: Option<Mask<'a>>,
 }
 
@@ -52,9 +53,9 @@ impl OpenLayout {
     }
 
     /// One value in full precision.
-    fn value(&self, cursor: &mut Cursor) -> Result<Value, String> {
+    fn value(&self, cursor: &mut Cursor) -> Result<VoxelValue, String> {
         let bytes = cursor.take(self.channels * self.number_bytes)?;
-        let mut value = Value::default();
+        let mut value = VoxelValue::default();
         numbers(bytes, self.number_bytes, &mut value[..self.channels]);
         Ok(value)
     }
@@ -70,7 +71,7 @@ impl OpenLayout {
         cursor: &mut Cursor<'a>,
         active: Mask,
         count: usize,
-        background: Value,
+        background: VoxelValue,
     ) -> Result<Stored<'a>, String> {
         let [kind] = cursor.array()?;
         let negative = background.map(|x| -x);
@@ -206,7 +207,7 @@ fn root_place(cursor: &mut Cursor, places: &mut BTreeSet<[i64; 3]>) -> Result<[i
 fn node<'a>(
     layout: &OpenLayout,
     cursor: &mut Cursor<'a>,
-    background: Value,
+    background: VoxelValue,
     origin: [i64; 3],
     log2: u32,
 ) -> Result<TreeNode<'a, Stored<'a>>, String> {
