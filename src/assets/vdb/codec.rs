@@ -13,15 +13,10 @@ pub enum Codec {
 }
 
 /// Decompresses, with buffers that are used again.
+#[derive(Default)]
 pub struct Decoder {
     zlib: Option<Decompress>,
     shuffled: Vec<u8>,
-}
-
-impl Default for Decoder {
-    fn default() -> Self {
-        Self { zlib: None, shuffled: Vec::new() }
-    }
 }
 
 impl Decoder {

@@ -176,8 +176,7 @@ pub fn read_tree<'a>(layout: &NanoLayout, bytes: &'a [u8]) -> Result<Topology<'a
         let mut cursor = Cursor::new(tile);
         let (key, child, state) = (cursor.u64()?, cursor.i64()?, cursor.u32()?);
         // 21 bits for each axis, of which the upper 20 bits of a coordinate are used; z is in the lowest.
-        let origin = [42, 21, 0].map(|shift| i64::from(((key >> shift) as u32) << 12 as i32));
-        let origin = origin.map(|x| i64::from(x as i32));
+        let origin = [42, 21, 0].map(|shift| i64::from((((key >> shift) as u32) << 12) as i32));
         if !places.insert(origin) {
             return Err(format!("has two nodes at {origin:?}"));
         }
