@@ -369,7 +369,10 @@ fn a_state_in_the_middle_of_a_sample_goes_on() {
     large["integrator"] = json!({ "type": "path", "max_depth": 2 });
     // One thread: none looks at the file while another copies it.
     for guiding in [false, true] {
-        goes_on_in_the_middle(&Kit::new(&large, &Overrides { threads: Some(1), guiding: Some(guiding), ..spp(2) }));
+        goes_on_in_the_middle(&Kit::new(
+            &large,
+            &Overrides { threads: Some(1), guiding: Some(guiding.into()), ..spp(2) },
+        ));
     }
 }
 

@@ -4,6 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use serde_json::{Value, json};
 use steradian::Error;
+use steradian::desc::GuidingDesc;
 use steradian::internal::accel::{self, AccelKind};
 use steradian::internal::film::{Image, LayerKind};
 use steradian::internal::math::Rng;
@@ -76,7 +77,7 @@ pub fn room_with_shaft() -> Value {
 }
 
 fn run(scene: &Value, guiding: bool, overrides: &Overrides) -> RenderResult {
-    let overrides = Overrides { guiding: Some(guiding), ..overrides.clone() };
+    let overrides = Overrides { guiding: Some(guiding.into()), ..overrides.clone() };
     let prepared = prepare(scene, &overrides);
     let accel = accel::build(AccelKind::EMBREE, &prepared.scene.geometry, 1).unwrap();
     render::render(&prepared.scene, &*accel, &prepared.settings, &Silent, &false.into()).unwrap()
@@ -115,8 +116,12 @@ fn guiding_lowers_the_error_where_light_is_hard_to_find() {
 fn guided_pictures_do_not_depend_on_threads() {
     let images: Vec<Image> = [1, 2, 3]
         .map(|threads| {
-            let overrides =
-                Overrides { threads: Some(threads), guiding: Some(true), spp: Some(24), ..Overrides::default() };
+            let overrides = Overrides {
+                threads: Some(threads),
+                guiding: Some(GuidingDesc::On),
+                spp: Some(24),
+                ..Overrides::default()
+            };
             render_with(&prepare(&room(), &overrides), AccelKind::EMBREE).image
         })
         .into();
@@ -176,7 +181,7 @@ fn what_guiding_cannot_do_is_refused() {
             other => panic!("{other:?}"),
         }
     };
-    let on = Overrides { guiding: Some(true), ..Overrides::default() };
+    let on = Overrides { guiding: Some(GuidingDesc::On), ..Overrides::default() };
     assert!(refusal(&room(), &Overrides { target_error: Some(0.01), ..on.clone() }).starts_with("`target_error`"));
     let mut normals = room();
     normals["integrator"] = json!({ "type": "normal" });
@@ -188,7 +193,10 @@ fn what_guiding_cannot_do_is_refused() {
 }
 
 fn kit(scene: &Value, spp: u32) -> Kit {
-    Kit::new(scene, &Overrides { guiding: Some(true), spp: Some(spp), threads: Some(2), ..Overrides::default() })
+    Kit::new(
+        scene,
+        &Overrides { guiding: Some(GuidingDesc::On), spp: Some(spp), threads: Some(2), ..Overrides::default() },
+    )
 }
 
 /// Renders until a tile of a random pass is done; the state is what a file has kept of it.

@@ -71,6 +71,8 @@ mod glassware;
 /// glTF files as they look: which way up images, normals and glass are.
 mod gltf_rendering;
 mod guiding;
+/// Guiding that a pilot decides on.
+mod guiding_auto;
 /// Media that differ from place to place, and distances chosen for lights.
 mod heterogeneous_media;
 /// Progress, logs, colours, configuration and manual pages.

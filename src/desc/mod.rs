@@ -44,8 +44,8 @@ pub(crate) use principled::principled_parameters;
 pub use principled::{PrincipledDesc, PrincipledModelDesc, SubsurfaceMethodDesc};
 pub use relief::{BumpMapDesc, NormalMapDesc};
 pub use settings::{
-    CausticsDesc, DEFAULT_RR_DEPTH, FilmDesc, FilterDesc, FilterSamplesDesc, IntegratorDesc, MAX_FILTER_RADIUS,
-    MAX_SIDE, RouletteDesc, SamplerDesc, SamplerKindDesc, StrategyDesc,
+    CausticsDesc, DEFAULT_RR_DEPTH, FilmDesc, FilterDesc, FilterSamplesDesc, GuidingDesc, IntegratorDesc,
+    MAX_FILTER_RADIUS, MAX_SIDE, RouletteDesc, SamplerDesc, SamplerKindDesc, StrategyDesc,
 };
 pub use shape::{
     ConeDesc, CubeDesc, CurvesDesc, CylinderDesc, DiskDesc, InstanceDesc, MeshDesc, ObjectDesc, OpacityDesc, PlaneDesc,

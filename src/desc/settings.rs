@@ -1,6 +1,9 @@
 //! Film, sampler and integrator as written.
 
+use std::fmt;
+
 use schemars::JsonSchema;
+use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::lists::{Spread, spread};
@@ -237,9 +240,9 @@ pub enum IntegratorDesc {
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         hide_emitters: bool,
         /// Whether paths learn from earlier ones where light comes from: less noise where most of it comes by few ways,
-        /// such as through a door ajar, for some time of learning. Default: false.
-        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-        guiding: bool,
+        /// such as through a door ajar, for some time of learning. Default: off.
+        #[serde(default, skip_serializing_if = "GuidingDesc::is_default")]
+        guiding: GuidingDesc,
         /// How caustics are found: light that mirrors and clear glass throw on other surfaces. Default: paths.
         #[serde(default, skip_serializing_if = "CausticsDesc::is_default")]
         caustics: CausticsDesc,
@@ -302,7 +305,7 @@ impl IntegratorDesc {
             clamp: None,
             regularize: None,
             hide_emitters: false,
-            guiding: false,
+            guiding: GuidingDesc::default(),
             caustics: CausticsDesc::default(),
         }
     }
@@ -377,6 +380,65 @@ pub enum RouletteDesc {
     Auto,
     /// Never.
     Off,
+}
+
+/// Whether paths are guided by what earlier ones have learned of the light. All give the same picture; they differ in
+/// noise and time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum GuidingDesc {
+    /// Never.
+    #[default]
+    Off,
+    /// If a pilot finds that it lowers the error more than it costs, after four samples of each pixel. Never with fewer
+    /// than 64 samples of each, nor with a target error or photons, nor in shards.
+    Auto,
+    /// From the second sample of each pixel on, as long as it pays.
+    On,
+}
+
+impl GuidingDesc {
+    const NAMES: [&str; 3] = ["off", "auto", "on"];
+
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl From<bool> for GuidingDesc {
+    fn from(is_on: bool) -> Self {
+        if is_on { Self::On } else { Self::Off }
+    }
+}
+
+/// By name; `true` is `on`, `false` is `off`.
+impl<'de> Deserialize<'de> for GuidingDesc {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct NameOrSwitch;
+
+        impl Visitor<'_> for NameOrSwitch {
+            type Value = GuidingDesc;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("off, auto or on")
+            }
+
+            fn visit_bool<E: Error>(self, is_on: bool) -> Result<GuidingDesc, E> {
+                Ok(is_on.into())
+            }
+
+            fn visit_str<E: Error>(self, name: &str) -> Result<GuidingDesc, E> {
+                match name {
+                    "off" => Ok(GuidingDesc::Off),
+                    "auto" => Ok(GuidingDesc::Auto),
+                    "on" => Ok(GuidingDesc::On),
+                    _ => Err(E::unknown_variant(name, &GuidingDesc::NAMES)),
+                }
+            }
+        }
+
+        deserializer.deserialize_any(NameOrSwitch)
+    }
 }
 
 impl RouletteDesc {

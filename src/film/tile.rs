@@ -360,9 +360,12 @@ impl FilmTile {
     }
 
     /// Adds all samples of another tile of the same pixels and layers, each counted `factor` times as much as a single
-    /// one, except in layers of data and of coverage. Nothing may be added to this tile but by this.
+    /// one, except in layers of data and of coverage. Nothing may be added to this tile but by this from then on.
     pub fn merge_inverse_variance(&mut self, other: &Self, factor: f64) {
-        self.weighed.resize(self.samples.len(), InverseVarianceSums::default());
+        if self.weighed.is_empty() {
+            let counted = |pixel| InverseVarianceSums { count: self.count_at(pixel), variance: self.variance(pixel) };
+            self.weighed = (0..self.samples.len()).map(counted).collect();
+        }
         for (pixel, weighed) in self.weighed.iter_mut().enumerate() {
             let count = f64::from(other.samples[pixel]) * factor;
             let (before, added) = (weighed.count, count);

@@ -24,7 +24,7 @@ use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::prefetch::prefetch;
 use crate::math::random::hash64;
 use crate::math::rows::BATCH;
-use crate::math::{Aabb, Vec3};
+use crate::math::{Aabb, Vec3, ln_of};
 use directions::square_of;
 use quadtree::{Descent, DirectionRecords};
 use space::{MAX_DEPTH, Node, SpaceTrees};
@@ -87,7 +87,7 @@ impl Leaf {
         }
         let usual = BSDF_SAMPLING_FRACTION * bsdf + (1.0 - BSDF_SAMPLING_FRACTION) * guide;
         for (sum, fraction) in self.gains.iter().zip(OTHER_FRACTIONS) {
-            let gain = ((fraction * bsdf + (1.0 - fraction) * guide) / usual).ln();
+            let gain = ln_of((fraction * bsdf + (1.0 - fraction) * guide) / usual);
             sum.fetch_add((amount * gain) as i64, Ordering::Relaxed);
         }
     }
@@ -147,7 +147,6 @@ pub struct Guide {
     leaves: Vec<Leaf>,
     /// From light to whole numbers.
     scale: f32,
-    learns: bool,
 }
 
 impl Guide {
@@ -161,7 +160,6 @@ impl Guide {
             learned: vec![Region { directions: None, bsdf_sampling_fraction: BSDF_SAMPLING_FRACTION }; ROOTS],
             leaves: (0..ROOTS).map(|_| Leaf::default()).collect(),
             scale: scale_of(typical),
-            learns: true,
         };
         guide.set_bounds(bounds);
         guide
@@ -184,20 +182,10 @@ impl Guide {
         self.scale > 0.0
     }
 
-    /// Whether records are taken.
-    pub fn learns(&self) -> bool {
-        self.learns
-    }
-
-    /// Sets whether records are taken.
-    pub fn set_learning(&mut self, learns: bool) {
-        self.learns = learns;
-    }
-
     /// The guide without its records, which takes no further ones.
     #[must_use]
     pub fn into_trained(self) -> Self {
-        Self { leaves: Vec::new(), learns: false, ..self }
+        Self { leaves: Vec::new(), ..self }
     }
 
     /// What is known of the light at a surface whose normal, on the side of the path, is `n`; `None` if nothing.

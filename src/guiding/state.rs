@@ -33,7 +33,7 @@ impl Clone for Guide {
 }
 
 impl Guide {
-    /// Writes all but the bounds, and whether it learns.
+    /// Writes all but the bounds.
     pub fn write(&self, out: &mut ByteWriter) {
         out.integers(&self.trees.nodes().iter().map(|node| node.0).collect::<Vec<_>>());
         out.integers(&[self.scale.to_bits()]);
@@ -53,7 +53,7 @@ impl Guide {
         }
     }
 
-    /// Reads what [`write`](Self::write) gave; `None` if it is no guide. The bounds are still to be set, and it learns.
+    /// Reads what [`write`](Self::write) gave; `None` if it is no guide. The bounds are still to be set.
     pub fn read(data: &mut ByteReader) -> Option<Self> {
         let nodes: Vec<Node> = data.integers()?.into_iter().map(Node).collect();
         let leaves = count_leaves(&nodes).filter(|count| *count <= MAX_LEAVES)?;

@@ -160,9 +160,6 @@ fn nothing_known_is_said_and_brightness_may_come_later() {
     guide.set_typical(1.0);
     guide.record(&[record(Vec3::splat(0.5), Vec3::X, 1.0)]);
     assert!(guide.has_radiance_scale() && guide.refined(2).at(Vec3::splat(0.5), Vec3::Z).is_some());
-    assert!(guide.learns());
-    guide.set_learning(false);
-    assert!(!guide.learns());
 }
 
 #[test]

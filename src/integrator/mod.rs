@@ -196,6 +196,26 @@ impl RayCounts {
     }
 }
 
+/// The incident radiance that has been learned, and what learns it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Guidance<'a> {
+    /// What guides paths, if they are guided.
+    pub guide: Option<&'a Guide>,
+    /// What records the light that paths find, if anything does.
+    pub learner: Option<&'a Guide>,
+    /// Whether [`Workspace::second_moments`] are wanted.
+    pub has_moments: bool,
+}
+
+/// Second moments of a sample's radiance, by channel: sums over the contributions of its path.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SecondMoments {
+    /// As paths are guided.
+    pub guided: [f64; 3],
+    /// As they would be without the guide, by the ratio of the densities.
+    pub unguided: [f64; 3],
+}
+
 /// What all batches of a pass read.
 #[derive(Clone, Copy)]
 pub struct PassContext<'a> {
@@ -203,8 +223,8 @@ pub struct PassContext<'a> {
     pub world: &'a World<'a>,
     /// The picture and the end of the render.
     pub render: RenderContext<'a>,
-    /// The learned incident radiance, if paths are guided.
-    pub guide: Option<&'a Guide>,
+    /// What guides paths, and what learns from them.
+    pub guidance: Guidance<'a>,
     /// The photons that paths gather, if they do.
     pub caustics: Option<&'a Caustics<'a>>,
     /// What Russian roulette goes by, if it is [`Roulette::Auto`].
@@ -228,6 +248,13 @@ pub struct Workspace {
     /// The rays of all batches.
     pub counts: RayCounts,
     paths: PathBuffers,
+}
+
+impl Workspace {
+    /// The second moments of the last batch's samples, if the guidance asked for them.
+    pub fn second_moments(&self) -> Vec<SecondMoments> {
+        self.paths.second_moments(&self.out)
+    }
 }
 
 /// Estimates the radiance of camera samples.

@@ -106,6 +106,8 @@ impl Driver<'_> {
         // Of one sample of one tile, by the last pass.
         let mut tile_time = None;
         loop {
+            let pilot = self.pool.install(|| state.run_guiding_pilot(&self.renderer, &self.workspaces));
+            state.rays.add(&pilot);
             let Some(pass) = state.next_pass(self.session, size) else {
                 state.complete = true;
                 break;
@@ -153,7 +155,7 @@ impl Driver<'_> {
     }
 
     fn render_pass(&self, state: &mut RenderState, pass: &Pass) -> RayCounts {
-        let (tiles, samples) = state.work_of(pass);
+        let (tiles, samples) = state.work_of(pass, self.session.settings.spp);
         let render_tile = |tile: &mut FilmTile| {
             let thread = rayon::current_thread_index().unwrap_or(0);
             let mut workspace = self.workspaces[thread].lock().unwrap_or_else(PoisonError::into_inner);

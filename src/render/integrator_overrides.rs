@@ -2,7 +2,7 @@
 
 use super::Overrides;
 use super::settings::refused;
-use crate::desc::{CausticsDesc, DEFAULT_RR_DEPTH, IntegratorDesc, RouletteDesc, SceneDesc, StrategyDesc};
+use crate::desc::{CausticsDesc, DEFAULT_RR_DEPTH, GuidingDesc, IntegratorDesc, RouletteDesc, SceneDesc, StrategyDesc};
 use crate::error::Result;
 
 /// The integrator of a scene, with the parameters that settings change.
@@ -72,20 +72,23 @@ fn set_roulette(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Resul
 }
 
 fn set_guiding(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Result<()> {
-    if let Some(enabled) = overrides.guiding {
-        let IntegratorDesc::Path { guiding, .. } = integrator else {
-            return Err(refused("guiding", ": only the integrator path can be guided"));
-        };
-        *guiding = enabled;
+    if let Some(chosen) = overrides.guiding {
+        match integrator {
+            IntegratorDesc::Path { guiding, .. } => *guiding = chosen,
+            _ if chosen == GuidingDesc::On => {
+                return Err(refused("guiding", ": only the integrator path can be guided"));
+            }
+            _ => {}
+        }
     }
     if overrides.guide.is_some() {
         let IntegratorDesc::Path { guiding, .. } = integrator else {
             return Err(refused("guide", ": only the integrator path can be guided"));
         };
         // The guide is not trained further, whatever the scene says.
-        *guiding = false;
+        *guiding = GuidingDesc::Off;
     }
-    if matches!(integrator, IntegratorDesc::Path { guiding: true, .. }) && overrides.target_error.is_some() {
+    if matches!(integrator, IntegratorDesc::Path { guiding: GuidingDesc::On, .. }) && overrides.target_error.is_some() {
         return Err(refused(
             "target_error",
             ": not with guiding; give `guide`, `guiding` off, or `spp` or `time_limit` in its place",
@@ -107,7 +110,7 @@ fn set_caustics(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Resul
     let other = [
         (*strategy != StrategyDesc::Mis, "`strategy` other than mis"),
         (regularize.is_some(), "`regularize`"),
-        (*guiding, "`guiding` on"),
+        (*guiding == GuidingDesc::On, "`guiding` on"),
         (overrides.guide.is_some(), "`guide`"),
         (overrides.target_error.is_some(), "`target_error`"),
     ];

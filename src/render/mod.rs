@@ -6,6 +6,7 @@
 mod caustic_pass;
 mod driver;
 mod exr_overrides;
+mod guiding_pilot;
 mod integrator_overrides;
 mod overrides;
 mod pixel_order;
@@ -25,6 +26,7 @@ pub use progress::{Progress, Silent};
 pub use provenance::{RenderProvenance, SequenceFrame};
 pub(crate) use settings::refused;
 pub use settings::{DEFAULT_EXTENSIONS, Settings, threads};
+pub(crate) use state::GuidingStage;
 pub use state::{Checkpoints, Header, Merged, RenderState, Shard, StateFile, check_resumable, merge};
 pub use trained_guide::TrainedGuide;
 
@@ -37,7 +39,7 @@ use tile_renderer::{TileRenderer, TileWorkspace};
 use crate::accel::Accelerator;
 use crate::error::{Error, Result};
 use crate::film::{DroppedSample, Film, FilmShape, Image, LayerKind, LayerSet, PixelSample, SurfaceSample};
-use crate::integrator::RayCounts;
+use crate::integrator::{Guidance, RayCounts};
 use crate::light::LightGroups;
 use crate::scene::Scene;
 
@@ -166,6 +168,13 @@ pub fn replay(
             ": with guiding, a sample depends on all that were before; replay it with `guiding` off or `guide`",
         ));
     }
+    if settings.has_guiding_pilot() && sample >= planner::LEARNED {
+        let message = format!(
+            ": with `guiding` auto, samples from {} on may depend on those before; give `guiding` off or `guide`",
+            planner::LEARNED
+        );
+        return Err(refused("pixel", message));
+    }
     let mut renderer = TileRenderer::new(scene, accel, settings);
     let workspace = [Mutex::<TileWorkspace>::default()];
     renderer.prepare(&workspace);
@@ -174,7 +183,7 @@ pub fn replay(
     let mut workspace = workspace.into_inner().unwrap_or_else(PoisonError::into_inner);
     let pixel = pixel.map(|x| x + renderer.grid.offset);
     let origin = pixel.map(|x| x / TILE_SIZE * TILE_SIZE);
-    renderer.render_batch(origin, sample, None, &mut workspace);
+    renderer.render_batch(origin, sample, Guidance::default(), &mut workspace);
     let slot = slot_of_pixel([pixel[0] - origin[0], pixel[1] - origin[1]]);
     let place = slots(renderer.grid.area, origin).position(|other| other == slot);
     let out = &workspace.integrator.out;

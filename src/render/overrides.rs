@@ -4,7 +4,9 @@ use serde::Deserialize;
 
 use super::{ExrOverrides, TrainedGuide};
 use crate::accel::AccelKind;
-use crate::desc::{CausticsDesc, IntegratorDesc, LayerKind, RouletteDesc, SamplerKindDesc, StrategyDesc, ViewDesc};
+use crate::desc::{
+    CausticsDesc, GuidingDesc, IntegratorDesc, LayerKind, RouletteDesc, SamplerKindDesc, StrategyDesc, ViewDesc,
+};
 
 /// Settings of a render that replace the scene's; `None` keeps the value of the scene.
 ///
@@ -48,8 +50,8 @@ pub struct Overrides {
     pub roulette: Option<RouletteDesc>,
     /// How caustics are found.
     pub caustics: Option<CausticsDesc>,
-    /// Whether paths train a guide.
-    pub guiding: Option<bool>,
+    /// Whether paths are guided by what earlier ones have learned.
+    pub guiding: Option<GuidingDesc>,
     /// Paths are guided by it, and do not train it.
     #[serde(skip)]
     pub guide: Option<TrainedGuide>,

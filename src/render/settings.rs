@@ -7,10 +7,11 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::integrator_overrides::integrator;
-use super::{ExrOverrides, Overrides, TrainedGuide};
+use super::{ExrOverrides, Overrides, Shard, TrainedGuide};
 use crate::accel::AccelKind;
 use crate::desc::{
-    CausticsDesc, FilterDesc, IntegratorDesc, LayerKind, MAX_SIDE, OutputDesc, PixelTypeDesc, SceneDesc, ViewDesc,
+    CausticsDesc, FilterDesc, GuidingDesc, IntegratorDesc, LayerKind, MAX_SIDE, OutputDesc, PixelTypeDesc, SceneDesc,
+    StrategyDesc, ViewDesc,
 };
 use crate::error::{Error, Result};
 use crate::film::{Crop, LayerSet};
@@ -25,6 +26,15 @@ const MOST_SAMPLES: u32 = 1 << 16;
 
 /// More threads than this are a slip of the keyboard.
 const MAX_THREADS: usize = 4096;
+
+/// A pilot decides on guiding only of pictures with at least as many samples per pixel, so that it costs little,
+const LEAST_GUIDED_SPP: u32 = 64;
+
+/// with as many samples in all, so that there is something to learn from,
+const LEAST_GUIDED_SAMPLES: u64 = 1 << 20;
+
+/// and with paths of as many segments: one scattering is well served by lights and materials.
+const LEAST_GUIDED_DEPTH: u32 = 3;
 
 /// How a scene is rendered.
 ///
@@ -119,9 +129,35 @@ impl Settings {
         matches!(self.integrator, IntegratorDesc::Path { caustics: CausticsDesc::Photons, .. })
     }
 
-    /// Whether paths train a guide: a sample then depends on all that were before.
+    /// Whether paths train a guide in any case: a sample then depends on all that were before.
     pub fn is_guided(&self) -> bool {
-        matches!(self.integrator, IntegratorDesc::Path { guiding: true, .. })
+        matches!(self.integrator, IntegratorDesc::Path { guiding: GuidingDesc::On, .. })
+    }
+
+    /// For a part of the samples. What a pilot decides would depend on those of other parts: without a trained guide,
+    /// shards are not guided.
+    #[must_use]
+    pub fn of_shard(mut self, shard: Shard) -> Self {
+        if let IntegratorDesc::Path { guiding: guiding @ GuidingDesc::Auto, .. } = &mut self.integrator
+            && shard != Shard::WHOLE
+        {
+            *guiding = GuidingDesc::Off;
+        }
+        self
+    }
+
+    /// Whether a pilot decides if paths are guided.
+    pub fn has_guiding_pilot(&self) -> bool {
+        let IntegratorDesc::Path { guiding: GuidingDesc::Auto, strategy, max_depth, .. } = self.integrator else {
+            return false;
+        };
+        let samples = self.crop.area() * u64::from(self.spp);
+        let can_be_guided = self.guide.is_none() && self.target_error.is_none() && !self.gathers_photons();
+        can_be_guided
+            && strategy == StrategyDesc::Mis
+            && max_depth >= LEAST_GUIDED_DEPTH
+            && self.spp >= LEAST_GUIDED_SPP
+            && samples >= LEAST_GUIDED_SAMPLES
     }
 
     /// The view of the first PNG file; without one, that which suits the integrator.
@@ -272,7 +308,7 @@ fn outputs(desc: &SceneDesc, overrides: &Overrides, integrator: &IntegratorDesc)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::desc::{RouletteDesc, SamplerKindDesc, StrategyDesc};
+    use crate::desc::{RouletteDesc, SamplerKindDesc};
 
     fn scene(text: &str) -> SceneDesc {
         serde_json::from_str(text).unwrap()
@@ -349,7 +385,7 @@ mod tests {
             clamp: Some(2.5),
             regularize: None,
             hide_emitters: false,
-            guiding: false,
+            guiding: GuidingDesc::default(),
             roulette: RouletteDesc::Throughput,
             caustics: CausticsDesc::Paths,
         };

@@ -14,7 +14,7 @@ use crate::film::{
 };
 use crate::guiding::Guide;
 use crate::integrator::{
-    self, CameraBatch, CameraBlock, Continuation, Integrator, PassContext, RayCounts, RenderContext, Setup,
+    self, CameraBatch, CameraBlock, Continuation, Guidance, Integrator, PassContext, RayCounts, RenderContext, Setup,
     SurfaceAovs, Workspace, World, dimensions,
 };
 use crate::math::Vec2;
@@ -128,9 +128,9 @@ impl<'a> TileRenderer<'a> {
         }
     }
 
-    fn pass<'b>(&'b self, guide: Option<&'b Guide>) -> PassContext<'b> {
+    fn pass<'b>(&'b self, guidance: Guidance<'b>) -> PassContext<'b> {
         let continuations = self.roulette.as_ref().map(|roulette| &roulette.continuations);
-        PassContext { world: &self.world, render: self.context, guide, caustics: None, continuations }
+        PassContext { world: &self.world, render: self.context, guidance, caustics: None, continuations }
     }
 
     /// Traces the pilot of the picture, if roulette needs one; the result is the rays traced.
@@ -168,21 +168,27 @@ impl<'a> TileRenderer<'a> {
             self.camera_rays(count, film, numbers, block);
             samples.extend(count);
         }
-        self.integrator.trace_pilot(&self.pass(None), samples, integrator, continuations);
+        self.integrator.trace_pilot(&self.pass(Guidance::default()), samples, integrator, continuations);
     }
 
     /// Traces the photons of a sample's epoch, unless they are there; the result is the rays traced.
     pub fn trace_photons(&mut self, sample: u32, workspaces: &[Mutex<TileWorkspace>]) -> RayCounts {
         let Some(mut caustics) = self.caustics.take() else { return RayCounts::default() };
-        let counts = caustics.trace(sample, self.integrator.as_ref(), &self.pass(None), &self.sampler, workspaces);
+        let counts = caustics.trace(
+            sample,
+            self.integrator.as_ref(),
+            &self.pass(Guidance::default()),
+            &self.sampler,
+            workspaces,
+        );
         self.caustics = Some(caustics);
         counts
     }
 
     /// Renders one sample of every pixel of the tile with this origin, in the order of [`slots`].
-    pub fn render_batch(&self, origin: [u32; 2], sample: u32, guide: Option<&Guide>, workspace: &mut TileWorkspace) {
+    pub fn render_batch(&self, origin: [u32; 2], sample: u32, guidance: Guidance, workspace: &mut TileWorkspace) {
         let pixels = slots(self.grid.area, origin).map(pixel_of_slot);
-        self.render_samples(pixels.map(|[dx, dy]| ([origin[0] + dx, origin[1] + dy], sample)), guide, workspace);
+        self.render_samples(pixels.map(|[dx, dy]| ([origin[0] + dx, origin[1] + dy], sample)), guidance, workspace);
     }
 
     /// Renders samples of pixels, at most as many as a tile has pixels; the values are in their order.
@@ -190,7 +196,7 @@ impl<'a> TileRenderer<'a> {
     pub fn render_samples(
         &self,
         samples: impl Iterator<Item = ([u32; 2], u32)>,
-        guide: Option<&Guide>,
+        guidance: Guidance,
         workspace: &mut TileWorkspace,
     ) {
         let mut samples = samples.fuse();
@@ -219,7 +225,8 @@ impl<'a> TileRenderer<'a> {
             camera_batch.extend(count);
         }
         let caustics = self.caustics.as_ref().and_then(CausticPass::caustics);
-        let pass = PassContext { caustics: caustics.as_ref(), ..self.pass(guide.or(self.guide.as_ref())) };
+        let guidance = Guidance { guide: guidance.guide.or(self.guide.as_ref()), ..guidance };
+        let pass = PassContext { caustics: caustics.as_ref(), ..self.pass(guidance) };
         self.integrator.render_batch(&pass, &workspace.samples, &mut workspace.integrator);
     }
 
@@ -271,7 +278,7 @@ impl<'a> TileRenderer<'a> {
         &self,
         tile: &mut FilmTile,
         samples: Range<u32>,
-        guide: Option<&Guide>,
+        guidance: Guidance,
         workspace: &mut TileWorkspace,
     ) -> u64 {
         let active = tile.active();
@@ -290,7 +297,7 @@ impl<'a> TileRenderer<'a> {
             }
         }
         for sample in samples {
-            self.render_batch(origin, sample, guide, workspace);
+            self.render_batch(origin, sample, guidance, workspace);
             if self.context.is_cancelled() {
                 break;
             }

@@ -210,10 +210,11 @@ impl Renderer {
     /// # Errors
     /// [`Error::Setting`] if a setting is impossible.
     pub fn settings(&self) -> Result<Settings> {
-        if let Some(settings) = &self.settings {
-            return Ok(settings.clone());
-        }
-        changed_settings(&self.imported.desc, &self.assignments, &self.overrides)
+        let settings = match &self.settings {
+            Some(settings) => settings.clone(),
+            None => changed_settings(&self.imported.desc, &self.assignments, &self.overrides)?,
+        };
+        Ok(settings.of_shard(self.state.shard))
     }
 
     /// How the picture is made, for files that keep it, so that it can be rendered again; `None` if no output is an EXR

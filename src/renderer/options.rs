@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::{Assignment, DenoiseOptions, Renderer, StateOptions, StopHandle};
 use crate::accel::AccelKind;
-use crate::desc::{IntegratorDesc, LayerKind, RouletteDesc};
+use crate::desc::{GuidingDesc, IntegratorDesc, LayerKind, RouletteDesc};
 use crate::error::{Error, Result};
 use crate::film::LayerSet;
 use crate::render::{Overrides, Progress, RenderProvenance, Settings, TrainedGuide, refused};
@@ -86,10 +86,10 @@ impl Renderer {
         self
     }
 
-    /// Whether paths are guided by what earlier ones found.
+    /// Whether paths are guided by what earlier ones found; a `bool` is on or off.
     #[must_use]
-    pub fn guiding(mut self, enabled: bool) -> Self {
-        self.overrides.guiding = Some(enabled);
+    pub fn guiding(mut self, guiding: impl Into<GuidingDesc>) -> Self {
+        self.overrides.guiding = Some(guiding.into());
         self
     }
 

@@ -137,12 +137,10 @@ fn peers(
 /// Every combination of what was given, named by what differs.
 fn variants(arguments: &BenchErrorArgs, desc: &SceneDesc) -> Result<Vec<Variant>> {
     let mut variants = Vec::new();
-    let given = [(true, arguments.guiding), (false, arguments.no_guiding)];
-    let guidings: Vec<bool> = given.into_iter().filter(|(_, given)| *given).map(|(guiding, _)| guiding).collect();
     for integrator in choices(&arguments.integrator) {
         for sampler in choices(&arguments.sampler) {
             for strategy in choices(&arguments.strategy) {
-                for guiding in choices(&guidings) {
+                for guiding in choices(&arguments.guiding) {
                     for accel in choices(&arguments.accel) {
                         let overrides = Overrides {
                             integrator,
@@ -161,10 +159,7 @@ fn variants(arguments: &BenchErrorArgs, desc: &SceneDesc) -> Result<Vec<Variant>
                             part(&arguments.integrator, integrator.and_then(name)),
                             part(&arguments.sampler, sampler.and_then(name)),
                             part(&arguments.strategy, strategy.and_then(name)),
-                            part(
-                                &guidings,
-                                guiding.map(|on| if on { "guided".to_owned() } else { "not guided".to_owned() }),
-                            ),
+                            part(&arguments.guiding, guiding.and_then(name).map(|name| format!("guiding {name}"))),
                             part(&arguments.accel, accel.map(|accel| accel.to_string())),
                         ];
                         let parts: Vec<String> = parts.into_iter().flatten().collect();

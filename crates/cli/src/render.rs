@@ -98,6 +98,7 @@ impl<'a> Plan<'a> {
                 changed_settings(&shot.imported.desc, &arguments.set, &overrides)?
             }
         };
+        settings = settings.of_shard(arguments.state.shard.unwrap_or_default());
         if arguments.pixel.is_none() {
             files::of_render(arguments, shot, &settings.outputs, shard_name.as_deref(), session.uses.clone())?;
         }

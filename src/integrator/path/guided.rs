@@ -7,7 +7,9 @@ use super::evals::Surfaces;
 use super::radiance::Output;
 use super::wave::{BsdfScratch, PathRows};
 use crate::color::Rgb;
+use crate::film::SampleBatch;
 use crate::guiding::{DirectionLookups, Distributions, Guide, GuideSampleRows, Record, TreePoint};
+use crate::integrator::SecondMoments;
 use crate::light::light_target;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::rows::{BATCH, Row, Vec3Rows, soa};
@@ -26,6 +28,8 @@ struct GuideVertex {
     /// The weight of the scattering, and the path's throughput after it, without roulette.
     weight: Rgb,
     throughput: Rgb,
+    /// The density of the direction over that without the guide.
+    pdf_ratio: f32,
     /// The sample's radiance before the path went on.
     radiance_before: Rgb,
     slot: u32,
@@ -181,8 +185,8 @@ impl GuideRecorder {
         vectorize!(mix_samples(&regions.bsdf_sampling_fraction, samples, evals, mix, scatter));
     }
 
-    /// Records the directions of the paths that go on.
-    pub fn record(&mut self, vertices: &Vertices, paths: &PathRows) {
+    /// Records the directions of the paths that go on; `is_mixed` if the guide was among what chose them.
+    pub fn record(&mut self, vertices: &Vertices, paths: &PathRows, is_mixed: bool) {
         let scatter = &vertices.scatter;
         for lane in
             (0..vertices.count).filter(|&lane| scatter.status[lane] == spawn::SPAWNED && scatter.is_delta[lane] == 0)
@@ -190,17 +194,20 @@ impl GuideRecorder {
             if !is_guided(vertices, lane) {
                 continue;
             }
+            let has_pdfs = is_mixed && self.mix.has_pdfs[lane] != 0;
             let record = Record {
                 p: vertices.points.p.get(lane).as_vec3(),
                 n: vertices.facing_normal(lane),
                 direction: scatter.direction.get(lane),
                 light: 0.0,
-                densities: (self.mix.has_pdfs[lane] != 0).then(|| [self.mix.bsdf_pdf[lane], self.mix.guide_pdf[lane]]),
+                densities: has_pdfs.then(|| [self.mix.bsdf_pdf[lane], self.mix.guide_pdf[lane]]),
             };
             let weight = scatter.weight.get(lane);
             let throughput = vertices.rows.throughput.get(lane) * weight;
             let slot = paths.slot[vertices.path(lane)];
-            self.vertices.push(GuideVertex { record, weight, throughput, radiance_before: Rgb::BLACK, slot });
+            let pdf_ratio = if has_pdfs { scatter.pdf[lane] / self.mix.bsdf_pdf[lane] } else { 1.0 };
+            let radiance_before = Rgb::BLACK;
+            self.vertices.push(GuideVertex { record, weight, throughput, pdf_ratio, radiance_before, slot });
         }
     }
 
@@ -212,9 +219,41 @@ impl GuideRecorder {
         self.marked = self.vertices.len();
     }
 
+    /// Second moments of all samples. A contribution is what a path adds from one of its vertices to the next. Paths
+    /// with the density `r` times that without the guide add `r` times less, so that the mean without it of the square
+    /// of a contribution `c r` is the mean of `c² r`.
+    pub fn second_moments(&self, out: &SampleBatch) -> Vec<SecondMoments> {
+        #[derive(Clone, Copy)]
+        struct State {
+            radiance: Rgb,
+            ratio: f64,
+        }
+
+        let count = out.pixels.len();
+        let mut moments = vec![SecondMoments::default(); count];
+        let mut states = vec![State { radiance: Rgb::BLACK, ratio: 1.0 }; count];
+        let add = |moments: &mut SecondMoments, state: &State, radiance: Rgb| {
+            for (k, c) in (radiance - state.radiance).to_array().into_iter().enumerate() {
+                let square = f64::from(c).powi(2);
+                moments.guided[k] += square;
+                moments.unguided[k] += square * state.ratio;
+            }
+        };
+        for vertex in &self.vertices {
+            let slot = vertex.slot as usize;
+            add(&mut moments[slot], &states[slot], vertex.radiance_before);
+            let ratio = states[slot].ratio * f64::from(vertex.pdf_ratio);
+            states[slot] = State { radiance: vertex.radiance_before, ratio };
+        }
+        for ((moments, state), pixel) in moments.iter_mut().zip(&states).zip(&out.pixels) {
+            add(moments, state, pixel.radiance);
+        }
+        moments
+    }
+
     /// Records what came from all directions.
-    pub fn commit(&mut self, guide: Option<&Guide>, out: &Output) {
-        let Some(guide) = guide.filter(|guide| guide.learns()) else { return };
+    pub fn commit(&mut self, learner: Option<&Guide>, out: &Output) {
+        let Some(guide) = learner else { return };
         let with_light = |vertex: &GuideVertex| Record { light: vertex.scattered(out), ..vertex.record };
         self.records.clear();
         self.records.extend(self.vertices.iter().map(with_light));

@@ -31,11 +31,11 @@ mod wave;
 use super::cancel;
 use super::regularization::Regularization;
 use super::{
-    CameraBatch, CausticCasters, Continuation, Integrator, PassContext, Photon, PhotonRange, Roulette, Strategy,
-    SurfaceAovs, Workspace, World, dimensions,
+    CameraBatch, CausticCasters, Continuation, Guidance, Integrator, PassContext, Photon, PhotonRange, Roulette,
+    SecondMoments, Strategy, SurfaceAovs, Workspace, World, dimensions,
 };
 use crate::color::Rgb;
-use crate::film::LightAovRequest;
+use crate::film::{LightAovRequest, SampleBatch};
 use crate::light::MisCompensation;
 use crate::sampling::Sampler;
 use crate::scene::Scene;
@@ -101,6 +101,13 @@ impl Context<'_> {
 #[derive(Default)]
 pub(super) struct PathBuffers(Wave);
 
+impl PathBuffers {
+    /// As [`Workspace::second_moments`].
+    pub fn second_moments(&self, out: &SampleBatch) -> Vec<SecondMoments> {
+        self.0.guided.second_moments(out)
+    }
+}
+
 impl Integrator for PathIntegrator {
     fn render_batch(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace) {
         workspace.out.reset(samples.len(), self.surface_aovs != SurfaceAovs::default(), self.light_aovs);
@@ -131,7 +138,7 @@ impl Integrator for PathIntegrator {
             light_aovs: LightAovRequest::default(),
             ..self.clone()
         };
-        let pass = PassContext { guide: None, caustics: None, continuations: None, ..*pass };
+        let pass = PassContext { guidance: Guidance::default(), caustics: None, continuations: None, ..*pass };
         workspace.paths.0.continuations.enable();
         pilot.render_batch(&pass, samples, workspace);
         let Workspace { out, paths: PathBuffers(wave), .. } = workspace;
@@ -158,7 +165,7 @@ impl PathIntegrator {
 
     /// The main loop.
     fn render_wave(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace) {
-        let PassContext { world, render, guide, .. } = *pass;
+        let PassContext { world, render, guidance: Guidance { guide, learner, .. }, .. } = *pass;
         let Workspace { out, counts, paths: PathBuffers(wave) } = workspace;
         let (compensation, out) = (self.strategy.compensation(), &mut Output { batch: out });
         let mut context =
@@ -205,7 +212,7 @@ impl PathIntegrator {
             wave.guided.mark_radiance(out);
             wave.continuations.mark_radiance(out);
         }
-        wave.guided.commit(guide, out);
+        wave.guided.commit(learner, out);
         counts.add(&wave.counts);
     }
 }

@@ -9,8 +9,8 @@ use crate::film::LightAovRequest;
 use crate::geometry::Hit;
 use crate::id::LightId;
 use crate::integrator::{
-    CameraBatch, CameraSample, CausticCasters, CausticPoint, PassContext, Photon, PhotonRange, RayCounts, Roulette,
-    SurfaceAovs, Workspace, cancel, dimensions,
+    CameraBatch, CameraSample, CausticCasters, CausticPoint, Guidance, PassContext, Photon, PhotonRange, RayCounts,
+    Roulette, SurfaceAovs, Workspace, cancel, dimensions,
 };
 use crate::light::{LightSampleContext, ShadowTarget};
 use crate::math::rows::BATCH;
@@ -52,7 +52,7 @@ pub(super) fn trace(
         light_aovs: LightAovRequest::default(),
         ..config.clone()
     };
-    let pass = &PassContext { guide: None, caustics: None, continuations: None, ..*pass };
+    let pass = &PassContext { guidance: Guidance::default(), caustics: None, continuations: None, ..*pass };
     let (world, compensation) = (pass.world, config.strategy.compensation());
     let mut context = Context { config, pass, world, scene: world.scene, bounce: 0, is_last: false, compensation };
     let Workspace { counts, paths: PathBuffers(wave), .. } = workspace;

@@ -8,7 +8,6 @@ use super::terminator;
 use super::wave::{BsdfScratch, Wave, path_flags};
 use crate::bsdf::Lambert;
 use crate::geometry::SpawnPoint;
-use crate::guiding::Guide;
 use crate::integrator::roulette::SurvivalRule;
 use crate::integrator::vertex::HemisphereTest;
 use crate::math::Frame;
@@ -56,8 +55,9 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
             },
         );
     }
-    if context.pass.guide.is_some_and(Guide::learns) {
-        guided.record(vertices, &paths[block]);
+    let guidance = &context.pass.guidance;
+    if guidance.learner.is_some() || guidance.has_moments {
+        guided.record(vertices, &paths[block], regions.is_some());
     }
     wave.continuations.record(&wave.vertices, &wave.paths[block]);
 }

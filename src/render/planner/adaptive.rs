@@ -12,6 +12,7 @@
 //! precisely the variance of its neighbours is estimated.
 
 use crate::film::{Crop, Film, FilmTile};
+use crate::integrator::Guidance;
 use crate::render::tile_renderer::{TileRenderer, TileWorkspace};
 use crate::render::{BLOCK_SIZE, Progress, TILE_SIZE};
 
@@ -363,7 +364,7 @@ fn render_groups(
         let of_sample = move |sample: u32| (0..BLOCK_PIXELS).map(move |within| (pixel(block, within), sample));
         (group * GROUP..(group + 1) * GROUP).flat_map(of_sample)
     };
-    renderer.render_samples(groups.iter().flat_map(of_group), None, workspace);
+    renderer.render_samples(groups.iter().flat_map(of_group), Guidance::default(), workspace);
     if renderer.context.is_cancelled() {
         return 0;
     }

@@ -3,10 +3,10 @@
 //! Later iterations are better than earlier ones, so they are averaged with [`IterationWeights`].
 
 use super::iteration_weights::{IterationWeights, mean};
-use super::training_schedule::{is_refinement, iteration_end, iteration_start, last_refinement, next_refinement};
+use super::training_schedule::{Training, is_refinement, iteration_end, iteration_start, next_refinement};
 use crate::bytes::{ByteReader, ByteWriter};
 use crate::error::Result;
-use crate::film::Film;
+use crate::film::{Film, LayerKind};
 use crate::guiding::Guide;
 use crate::math::Aabb;
 use crate::render::TILE_SIZE;
@@ -18,6 +18,13 @@ const MIN_GAINS: [(u32, f64); 2] = [(8, 1.2), (16, GUIDED_COST)];
 /// Time of a ray of a guided path over that of another, about, learning included: from 1.2 under many lights to 1.9 in
 /// a Cornell box.
 const GUIDED_COST: f64 = 1.9;
+
+/// A film like that of a render for the samples of an iteration, with what their weights depend on.
+fn iteration(film: &Film) -> Result<Film> {
+    let mut shape = film.shape().clone();
+    shape.layers.insert(LayerKind::Variance);
+    Film::new(shape, TILE_SIZE)
+}
 
 /// The guide, and the samples that have no weight yet.
 #[derive(Clone, Debug)]
@@ -31,41 +38,62 @@ pub(in crate::render) struct GuidedPlanner {
     /// Rays of the iteration under way.
     pub rays: u64,
     weights: IterationWeights,
+    training: Training,
 }
 
 impl GuidedPlanner {
     /// Of a render that begins, whose film this is.
     pub fn new(film: &Film) -> Result<Self> {
+        let guide = Guide::new(Aabb::EMPTY, 0.0);
+        let weights = IterationWeights::new(film, 1.0);
         Ok(Self {
-            guide: Some(Guide::new(Aabb::EMPTY, 0.0)),
-            iteration: Film::new(film.shape().clone(), TILE_SIZE)?,
+            guide: Some(guide),
+            iteration: iteration(film)?,
             merged: 0,
             rays: 0,
-            weights: IterationWeights::new(film),
+            weights,
+            training: Training::HalfOfSamples,
         })
     }
 
-    /// How many samples per pixel after the first `done` have the present guide and one weight. A guide that is used
-    /// until the end no longer learns.
-    pub fn samples_with_this_guide(&mut self, done: u32, spp: u32) -> u32 {
-        let mut end = iteration_end(done);
-        if let Some(guide) = &mut self.guide {
-            let refinement = next_refinement(done);
-            guide.set_learning(refinement <= last_refinement(spp));
-            end = end.min(refinement);
-        }
+    /// With a guide that has learned from the `done` samples per pixel of the film. Guided samples have `gain` times
+    /// less variance by the pilot. `None` if there is no memory for them.
+    pub fn trained(film: &Film, guide: Guide, done: u32, gain: f64) -> Option<Self> {
+        Some(Self {
+            guide: Some(guide),
+            iteration: iteration(film).ok()?,
+            merged: done,
+            rays: 0,
+            weights: IterationWeights::new(film, gain),
+            training: Training::FixedNumber,
+        })
+    }
+
+    /// How many samples per pixel after the first `done` have the present guide and one weight.
+    pub fn samples_with_this_guide(&self, done: u32) -> u32 {
+        let end = iteration_end(done);
+        let end = if self.guide.is_some() { end.min(next_refinement(done)) } else { end };
         end.saturating_sub(done)
+    }
+
+    /// Whether the guide learns from the sample with this index. One that is used until the end does not.
+    pub fn learns(&self, sample: u32, spp: u32) -> bool {
+        next_refinement(sample) <= self.training.last_refinement(spp)
     }
 
     /// Every pixel has `done` samples: refines the guide and ends the iteration, if that is due.
     pub fn complete_samples(&mut self, film: &mut Film, done: u32, spp: u32) {
-        if let Some(guide) = self.guide.as_mut().filter(|_| is_refinement(done) && done <= last_refinement(spp)) {
+        if let Some(guide) =
+            self.guide.as_mut().filter(|_| is_refinement(done) && done <= self.training.last_refinement(spp))
+        {
             *guide = guide.refined(done);
             if !guide.has_radiance_scale() {
                 guide.set_typical(mean(&self.iteration) as f32);
             }
         }
-        if done == spp || done == iteration_end(self.merged) {
+        // More samples may follow later.
+        let is_last = self.training == Training::HalfOfSamples && done == spp;
+        if is_last || done == iteration_end(self.merged) {
             self.complete_iteration(film, done);
         }
     }
@@ -81,7 +109,8 @@ impl GuidedPlanner {
                  {nodes} nodes"
             );
         }
-        let is_worth_it = MIN_GAINS.iter().all(|&(least, min_gain)| samples < least || gain >= min_gain);
+        let is_worth_it = self.training == Training::FixedNumber
+            || MIN_GAINS.iter().all(|&(least, min_gain)| samples < least || gain >= min_gain);
         if self.merged > 0 && !is_worth_it && self.guide.take().is_some() {
             tracing::info!("guiding does not pay and ends after {done} samples per pixel");
         }
@@ -110,7 +139,8 @@ impl GuidedPlanner {
     /// All but the film, as bytes.
     pub fn save(&self) -> Vec<u8> {
         let mut out = ByteWriter::default();
-        out.integers(&[self.merged, u32::from(self.guide.is_some())]);
+        let is_fixed = u32::from(self.training == Training::FixedNumber);
+        out.integers(&[self.merged, u32::from(self.guide.is_some()), is_fixed]);
         out.long(self.rays);
         self.weights.write(&mut out);
         if let Some(guide) = &self.guide {
@@ -123,10 +153,11 @@ impl GuidedPlanner {
     /// is something else.
     pub fn load(&mut self, bytes: &[u8], done: u32) -> Option<()> {
         let mut data = ByteReader::new(bytes);
-        let [merged, has_guide] = data.integers()?.try_into().ok()?;
-        if has_guide > 1 || !(merged == done || merged == iteration_start(done)) {
+        let [merged, has_guide, is_fixed] = data.integers()?.try_into().ok()?;
+        if has_guide.max(is_fixed) > 1 || !(merged == done || merged == iteration_start(done)) {
             return None;
         }
+        self.training = if is_fixed == 1 { Training::FixedNumber } else { Training::HalfOfSamples };
         self.merged = merged;
         self.rays = data.long()?;
         self.weights = IterationWeights::read(&mut data, &self.iteration)?;

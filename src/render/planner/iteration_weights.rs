@@ -102,9 +102,9 @@ pub(super) fn mean(film: &Film) -> f64 {
 }
 
 impl IterationWeights {
-    /// Before the first iteration.
-    pub fn new(film: &Film) -> Self {
-        Self { factors: vec![1.0; film.tiles().len()], first: None, last: None }
+    /// Before the first iteration, whose samples have this weight.
+    pub fn new(film: &Film, weight: f64) -> Self {
+        Self { factors: vec![weight; film.tiles().len()], first: None, last: None }
     }
 
     /// Adds an iteration of `spp` samples per pixel to the film of those before; the result is the variance times

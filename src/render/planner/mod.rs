@@ -4,21 +4,25 @@
 mod adaptive;
 mod guided;
 mod iteration_weights;
+mod pilot;
 mod training_schedule;
 
 pub(super) use adaptive::AdaptivePlanner;
 pub(super) use guided::GuidedPlanner;
+pub(super) use pilot::LEARNED;
+pub(super) use pilot::PilotPlanner;
 
 use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::Mutex;
 use std::time::Duration;
 
+use super::guiding_pilot::{GuidingGain, GuidingPilot};
 use super::tile_renderer::{TileRenderer, TileWorkspace};
-use super::{RenderSession, RenderState, Settings};
+use super::{GuidingStage, RenderSession, RenderState, Settings, Shard};
 use crate::error::Result;
 use crate::film::{DroppedSample, Film, FilmTile};
-use crate::guiding::Guide;
-use crate::integrator::{EPOCH, RayCounts};
+use crate::integrator::{EPOCH, Guidance, RayCounts};
 
 /// A pass over tiles of the film.
 #[derive(Clone, Debug)]
@@ -52,7 +56,7 @@ pub(super) struct PassSize {
 /// The samples of a pass.
 pub(super) enum PassSamples<'a> {
     /// The same of every pixel.
-    Uniform { samples: Range<u32>, guide: Option<&'a Guide> },
+    Uniform { samples: Range<u32>, guidance: Guidance<'a> },
     /// Groups of samples, of the blocks of pixels that need more; at most this number of each.
     Groups { planner: &'a AdaptivePlanner, most: u32 },
 }
@@ -61,7 +65,7 @@ impl PassSamples<'_> {
     /// Renders those of a tile; the result is how many they are.
     pub fn render_tile(&self, renderer: &TileRenderer, tile: &mut FilmTile, workspace: &mut TileWorkspace) -> u64 {
         match self {
-            Self::Uniform { samples, guide } => renderer.render_tile(tile, samples.clone(), *guide, workspace),
+            Self::Uniform { samples, guidance } => renderer.render_tile(tile, samples.clone(), *guidance, workspace),
             Self::Groups { planner, most } => planner.render_tile(renderer, tile, *most, workspace),
         }
     }
@@ -74,16 +78,39 @@ pub(super) enum Planner {
     Uniform,
     Adaptive(AdaptivePlanner),
     Guided(Box<GuidedPlanner>),
+    /// Whether paths are guided is still to be decided.
+    Pilot(Box<PilotPlanner>),
 }
 
 impl Planner {
     /// Of a render that begins; the film is its own.
-    pub fn new(settings: &Settings, film: &Film) -> Result<Self> {
+    pub fn new(settings: &Settings, film: &Film, shard: Shard) -> Result<Self> {
         Ok(match settings.target_error {
             Some(target) => Self::Adaptive(AdaptivePlanner::new(film.sampled(), target)),
             None if settings.is_guided() => Self::Guided(Box::new(GuidedPlanner::new(film)?)),
+            None if shard == Shard::WHOLE && settings.has_guiding_pilot() => Self::Pilot(Box::new(PilotPlanner::new())),
             None => Self::Uniform,
         })
+    }
+}
+
+impl Planner {
+    /// Of a render that goes on where paths are guided or may be.
+    pub fn guided(stage: GuidingStage, film: &Film) -> Result<Self> {
+        Ok(match stage {
+            GuidingStage::Off => Self::Uniform,
+            GuidingStage::Pilot => Self::Pilot(Box::new(PilotPlanner::new())),
+            GuidingStage::On => Self::Guided(Box::new(GuidedPlanner::new(film)?)),
+        })
+    }
+
+    /// Whether paths are guided.
+    pub fn guiding(&self) -> GuidingStage {
+        match self {
+            Self::Uniform | Self::Adaptive(_) => GuidingStage::Off,
+            Self::Pilot(_) => GuidingStage::Pilot,
+            Self::Guided(_) => GuidingStage::On,
+        }
     }
 }
 
@@ -98,6 +125,7 @@ impl RenderState {
             Planner::Guided(planner) => {
                 planner.guide.iter_mut().for_each(|guide| guide.set_bounds(session.accel.bounds()));
             }
+            Planner::Pilot(planner) => planner.guide.set_bounds(session.accel.bounds()),
             Planner::Uniform => {}
         }
         progress.start(self.shard.samples(settings.spp).len() as u32, pixels);
@@ -113,7 +141,8 @@ impl RenderState {
                 let is_missing = planner.plan(&self.film, spp, progress);
                 return is_missing.then_some(Pass { samples: 0..size.samples, tiles: 0..all });
             }
-            Planner::Guided(planner) => planner.samples_with_this_guide(self.done, spp),
+            Planner::Guided(planner) => planner.samples_with_this_guide(self.done),
+            Planner::Pilot(_) => PilotPlanner::samples_with_this_guide(self.done),
             // Of one epoch of photons.
             Planner::Uniform if session.settings.gathers_photons() => EPOCH - missing.start % EPOCH,
             Planner::Uniform => u32::MAX,
@@ -124,13 +153,22 @@ impl RenderState {
     }
 
     /// The tiles of a pass, and what they get.
-    pub(super) fn work_of(&mut self, pass: &Pass) -> (&mut [FilmTile], PassSamples<'_>) {
+    pub(super) fn work_of(&mut self, pass: &Pass, spp: u32) -> (&mut [FilmTile], PassSamples<'_>) {
         let samples = pass.samples.clone();
         let (film, samples) = match &mut self.planner {
-            Planner::Uniform => (&mut self.film, PassSamples::Uniform { samples, guide: None }),
+            Planner::Uniform => (&mut self.film, PassSamples::Uniform { samples, guidance: Guidance::default() }),
+            Planner::Pilot(planner) => {
+                let guidance = Guidance { learner: Some(&planner.guide), ..Guidance::default() };
+                (&mut self.film, PassSamples::Uniform { samples, guidance })
+            }
             Planner::Adaptive(planner) => (&mut self.film, PassSamples::Groups { planner, most: samples.end }),
             Planner::Guided(planner) => {
-                (&mut planner.iteration, PassSamples::Uniform { samples, guide: planner.guide.as_ref() })
+                let guide = planner.guide.as_ref();
+                let learner = guide.filter(|_| planner.learns(samples.start, spp));
+                (
+                    &mut planner.iteration,
+                    PassSamples::Uniform { samples, guidance: Guidance { guide, learner, has_moments: false } },
+                )
             }
         };
         (&mut film.tiles_mut()[pass.tiles.clone()], samples)
@@ -145,12 +183,53 @@ impl RenderState {
         let all = self.film.tiles().len();
         self.tiles_in_partial_pass = pass.tiles.end % all;
         self.done += if pass.tiles.end == all { pass.samples.len() as u32 } else { 0 };
-        if let Planner::Guided(planner) = &mut self.planner {
-            planner.rays = planner.rays.saturating_add(rays.total());
-            if self.tiles_in_partial_pass == 0 {
-                planner.complete_samples(&mut self.film, self.done, session.settings.spp);
+        match &mut self.planner {
+            Planner::Guided(planner) => {
+                planner.rays = planner.rays.saturating_add(rays.total());
+                if self.tiles_in_partial_pass == 0 {
+                    planner.complete_samples(&mut self.film, self.done, session.settings.spp);
+                }
             }
+            Planner::Pilot(planner) if self.tiles_in_partial_pass == 0 => planner.complete_samples(self.done),
+            _ => {}
         }
+    }
+
+    /// Traces what is due of the pilot of guiding, and decides on guiding after it; the result is the rays traced.
+    pub(super) fn run_guiding_pilot(
+        &mut self,
+        renderer: &TileRenderer,
+        workspaces: &[Mutex<TileWorkspace>],
+    ) -> RayCounts {
+        let pilot = GuidingPilot { renderer, workspaces, crop: self.film.grid().crop };
+        let Planner::Pilot(planner) = &mut self.planner else { return RayCounts::default() };
+        if !planner.has_begun() {
+            let unguided = pilot.unguided();
+            let counts = unguided.counts;
+            if !renderer.context.is_cancelled() {
+                planner.begin(unguided);
+                // Where the pilot is black there is nothing to learn.
+                if !planner.has_begun() {
+                    self.planner = Planner::Uniform;
+                }
+            }
+            return counts;
+        }
+        if self.done < LEARNED || renderer.context.is_cancelled() {
+            return RayCounts::default();
+        }
+        let [unguided, guided] = planner.compare(&pilot);
+        if renderer.context.is_cancelled() {
+            return RayCounts::default();
+        }
+        let gain = guided.gain_over(&unguided);
+        tracing::info!("pilot of guiding: {gain:?}");
+        let paying = gain.filter(GuidingGain::pays);
+        // Without memory for the samples of an iteration the picture is not guided.
+        let next =
+            paying.and_then(|gain| GuidedPlanner::trained(&self.film, planner.take_guide(), self.done, gain.variance));
+        self.planner = next.map_or(Planner::Uniform, |planner| Planner::Guided(Box::new(planner)));
+        guided.counts
     }
 
     /// The pass under way was cancelled: tiles differ in their samples.
@@ -167,7 +246,7 @@ impl RenderState {
     pub(super) fn can_end(&self) -> bool {
         match &self.planner {
             Planner::Adaptive(planner) => planner.has_pilot(),
-            Planner::Uniform | Planner::Guided(_) => self.tiles_in_partial_pass == 0,
+            Planner::Uniform | Planner::Guided(_) | Planner::Pilot(_) => self.tiles_in_partial_pass == 0,
         }
     }
 
@@ -183,7 +262,9 @@ impl RenderState {
     pub(super) fn samples(&self) -> u64 {
         match &self.planner {
             Planner::Adaptive(_) => self.film.samples(),
-            Planner::Uniform | Planner::Guided(_) => self.film.grid().crop.area() * u64::from(self.done),
+            Planner::Uniform | Planner::Guided(_) | Planner::Pilot(_) => {
+                self.film.grid().crop.area() * u64::from(self.done)
+            }
         }
     }
 

@@ -7,6 +7,9 @@ const FIRST_ITERATION: u32 = 2;
 /// How often the guide is refined while the samples double, at most.
 const REFINEMENTS: u32 = 4;
 
+/// Samples per pixel that a guide learns from, if that does not depend on their number.
+const LEARNED_SAMPLES: u32 = 32;
+
 /// The first sample of the iteration that the sample with this index belongs to: each has as many samples as all before
 /// it.
 pub(super) fn iteration_start(sample: u32) -> u32 {
@@ -25,10 +28,23 @@ pub(super) fn next_refinement(done: u32) -> u32 {
     (done / step * step).saturating_add(step)
 }
 
-/// Samples after which a guide of a render with `spp` samples per pixel is no longer refined: what the last half would
-/// learn does not pay for its records.
-pub(super) fn last_refinement(spp: u32) -> u32 {
-    spp / 2
+/// From which samples a guide learns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Training {
+    /// What the last half would learn does not pay for its records.
+    HalfOfSamples,
+    /// As many however many follow, so that these can be added later.
+    FixedNumber,
+}
+
+impl Training {
+    /// Samples after which a guide of a render with `spp` samples per pixel is no longer refined.
+    pub fn last_refinement(self, spp: u32) -> u32 {
+        match self {
+            Self::HalfOfSamples => spp / 2,
+            Self::FixedNumber => LEARNED_SAMPLES,
+        }
+    }
 }
 
 /// Whether a guide is refined after `done` samples per pixel.

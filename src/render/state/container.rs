@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! 8 bytes   "STERFILM"
-//! u32       version of the format, 6
+//! u32       version of the format, 7
 //! u32       bytes of the header
 //!           the header, JSON
 //!           blocks, each a u64 with its length in bytes and then the bytes
@@ -22,7 +22,7 @@ use crate::file;
 
 const MAGIC: [u8; 8] = *b"STERFILM";
 const END: [u8; 8] = *b"STEREND\n";
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 const BUFFER: usize = 1 << 20;
 /// The marks at the beginning.
 const START: u64 = 12;

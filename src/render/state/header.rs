@@ -71,6 +71,19 @@ const LEAST_BYTES: u64 = 48;
 /// A bound for the width and height of pictures, far above those that can be rendered.
 const MOST_PIXELS: u64 = 1 << 30;
 
+/// Whether paths are guided.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GuidingStage {
+    /// No, or not any longer.
+    #[default]
+    Off,
+    /// A guide learns for the pilot, which has not decided yet.
+    Pilot,
+    /// Yes.
+    On,
+}
+
 /// The header of a checkpoint or shard.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Header {
@@ -93,6 +106,9 @@ pub struct Header {
     pub tiles_in_partial_pass: u64,
     /// Whether no sample is missing.
     pub complete: bool,
+    /// Whether paths are guided from here on.
+    #[serde(default)]
+    pub guiding: GuidingStage,
     /// What the film holds.
     pub film: FilmShape,
     /// The files that the picture is to be written to.
@@ -135,11 +151,6 @@ impl Header {
         Reader::peek(file)
     }
 
-    /// Whether it is of a guided render.
-    pub(super) fn is_guided(&self) -> bool {
-        self.settings.get("integrator.guiding").is_some_and(|value| value == "true")
-    }
-
     /// What of it makes no sense in itself, so that no render can have written it; `None` if all does. `bytes` are
     /// those behind the header.
     pub(super) fn fault(&self, bytes: u64) -> Option<String> {
@@ -150,7 +161,7 @@ impl Header {
         let around = 2 * u64::from(self.film.overscan);
         if !(1..=count).contains(&index) {
             Some(format!("no shard {index} of {count}"))
-        } else if self.shard != Shard::WHOLE && self.is_guided() {
+        } else if self.shard != Shard::WHOLE && self.guiding != GuidingStage::Off {
             Some("a guided render has no shards".to_owned())
         } else if self.done > self.spp {
             Some(format!("{} of {} samples per pixel are done", self.done, self.spp))

@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use super::container::Reader;
-use super::{Header, RenderState, Shard};
+use super::{GuidingStage, Header, RenderState, Shard};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::guiding::Guide;
 use crate::integrator::RayCounts;
 use crate::render::TILE_SIZE;
-use crate::render::planner::{GuidedPlanner, Planner};
+use crate::render::planner::Planner;
 
 /// The picture of several shards.
 #[derive(Clone, Debug)]
@@ -47,7 +47,7 @@ pub fn merge(files: &[PathBuf], partial: bool) -> Result<Merged> {
         let message = format!("{message}; --partial merges what is there");
         return Err(Error::Checkpoint { file: file.clone(), message });
     }
-    let mut state = if headers[0].is_guided() {
+    let mut state = if headers[0].guiding != GuidingStage::Off {
         guided_state(first)?.0
     } else {
         let mut state = RenderState::of_film(film(&headers[0], first)?, Planner::Uniform, Shard::WHOLE);
@@ -108,18 +108,21 @@ fn film(header: &Header, file: &Path) -> Result<Film> {
 /// All samples of a guided render, which is never split, and its guide.
 fn guided_state(file: &Path) -> Result<(RenderState, Option<Guide>)> {
     let mut reader = Reader::open(file)?;
-    if !reader.header().is_guided() {
-        return Err(reader.fault("it is the state of a render without --guiding, and holds no guide"));
-    }
     let film = film(reader.header(), file)?;
-    let planner = Planner::Guided(Box::new(GuidedPlanner::new(&film)?));
+    let planner = match reader.header().guiding {
+        GuidingStage::Off => {
+            return Err(reader.fault("it is the state of a render without guiding, and holds no guide"));
+        }
+        stage => Planner::guided(stage, &film)?,
+    };
     let mut state = RenderState::of_film(film, planner, Shard::WHOLE);
     state.load(&mut reader)?;
     state.film = state.whole_film().into_owned();
-    let Planner::Guided(planner) = std::mem::replace(&mut state.planner, Planner::Uniform) else {
-        return Ok((state, None));
+    let guide = match std::mem::replace(&mut state.planner, Planner::Uniform) {
+        Planner::Guided(planner) => planner.guide,
+        _ => None,
     };
-    Ok((state, planner.guide))
+    Ok((state, guide))
 }
 
 /// The guide in the checkpoint of a guided render.

@@ -13,7 +13,7 @@ mod merge;
 pub use checkpoints::Checkpoints;
 pub use file::StateFile;
 pub(super) use header::put;
-pub use header::{Header, Shard};
+pub use header::{GuidingStage, Header, Shard};
 pub(super) use merge::read_guide;
 pub use merge::{Merged, merge};
 
@@ -67,7 +67,7 @@ impl RenderState {
     /// As [`Film::new`].
     pub fn new(scene: &Scene, settings: &Settings, shard: Shard) -> Result<Self> {
         let film = Film::new(super::film_shape(scene, settings), TILE_SIZE)?;
-        let planner = Planner::new(settings, &film)?;
+        let planner = Planner::new(settings, &film, shard)?;
         Ok(Self::of_film(film, planner, shard))
     }
 
@@ -95,10 +95,16 @@ impl RenderState {
     pub fn read(path: &Path, header: &Header, scene: &Scene, settings: &Settings) -> Result<Self> {
         let mut reader = Reader::open(path)?;
         fits(&reader, header)?;
-        let mut state = Self::new(scene, settings, header.shard)?;
-        if reader.header().film != *state.film.shape() {
+        let film = Film::new(super::film_shape(scene, settings), TILE_SIZE)?;
+        if reader.header().film != *film.shape() {
             return Err(reader.fault("the film has other layers"));
         }
+        let planner = match reader.header().guiding {
+            GuidingStage::Off if settings.target_error.is_none() => Planner::Uniform,
+            GuidingStage::Off => Planner::new(settings, &film, header.shard)?,
+            stage => Planner::guided(stage, &film)?,
+        };
+        let mut state = Self::of_film(film, planner, header.shard);
         state.load(&mut reader)?;
         Ok(state)
     }
@@ -112,6 +118,10 @@ impl RenderState {
         read_tiles(reader, &mut self.film)?;
         match &mut self.planner {
             Planner::Uniform => {}
+            Planner::Pilot(planner) => {
+                let bytes = reader.block()?;
+                planner.load(&bytes).ok_or_else(|| reader.fault("the guide is not what was saved of it"))?;
+            }
             Planner::Adaptive(planner) => {
                 let bytes = reader.block()?;
                 planner.load(&bytes).ok_or_else(|| reader.fault("the blocks of pixels are others"))?;
@@ -140,6 +150,7 @@ impl RenderState {
             done: self.done,
             tiles_in_partial_pass: self.tiles_in_partial_pass as u64,
             complete: self.complete,
+            guiding: self.planner.guiding(),
             film: self.film.shape().clone(),
             rays: [camera, indirect, shadow],
             render_seconds,
@@ -149,6 +160,7 @@ impl RenderState {
         write_tiles(&mut writer, &self.film)?;
         match &self.planner {
             Planner::Uniform => {}
+            Planner::Pilot(planner) => writer.block(&planner.save())?,
             Planner::Adaptive(planner) => writer.block(&planner.save())?,
             Planner::Guided(planner) => {
                 write_tiles(&mut writer, &planner.iteration)?;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use steradian::desc::{IntegratorDesc, SamplerKindDesc, StrategyDesc};
+use steradian::desc::{GuidingDesc, IntegratorDesc, SamplerKindDesc, StrategyDesc};
 use steradian::internal::accel::AccelKind;
 use steradian_bench::error::Peer;
 
@@ -92,11 +92,13 @@ pub struct BenchErrorArgs {
     ]
     pub strategy: Vec<StrategyDesc>,
     /// Path guiding: sample directions by the incident radiance learned from earlier paths
-    #[arg(long, help_heading = "Variants")]
-    pub guiding: bool,
-    /// No path guiding, whatever the scene sets; with --guiding a variant of either kind
-    #[arg(long, help_heading = "Variants")]
-    pub no_guiding: bool,
+    #[
+        arg(
+            long, value_name = "LIST", value_delimiter = ',', value_parser = names::plain::<GuidingDesc>(),
+            help_heading = "Variants"
+        )
+    ]
+    pub guiding: Vec<GuidingDesc>,
     /// Ray accelerator
     #[arg(long, value_name = "LIST", value_delimiter = ',', long_help = accel_help(), help_heading = "Variants")]
     pub accel: Vec<AccelKind>,

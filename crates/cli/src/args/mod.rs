@@ -24,7 +24,9 @@ use std::path::PathBuf;
 
 use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
-use steradian::desc::{CausticsDesc, IntegratorDesc, RouletteDesc, SamplerKindDesc, StrategyDesc, ViewDesc};
+use steradian::desc::{
+    CausticsDesc, GuidingDesc, IntegratorDesc, RouletteDesc, SamplerKindDesc, StrategyDesc, ViewDesc,
+};
 use steradian::internal::accel::AccelKind;
 use steradian::internal::render::{ExrOverrides, Overrides};
 use steradian::{Assignment, ExrChanges};
@@ -285,14 +287,21 @@ pub struct RenderArgs {
     pub caustics: Option<CausticsDesc>,
     /// Path guiding: sample directions by the incident radiance learned from earlier paths
     ///
-    /// For scenes whose light comes by few ways, such as through a door ajar. Iterations double; each is guided by the
-    /// samples of those before, and weighted by its inverse variance. Guiding ends where it does not pay. With
-    /// --checkpoint and --resume the picture is the same bit for bit. Unsupported with --shard: each part would have to
-    /// render nearly all samples to train the guide; --guide uses a trained one.
-    #[arg(long, help_heading = "Algorithm")]
-    pub guiding: bool,
-    /// The opposite of --guiding
-    #[arg(long, hide = true)]
+    /// For scenes whose light comes by few ways, such as through a door ajar. auto: if a pilot finds after four samples
+    /// per pixel that it lowers the error more than it costs; never below 64 samples per pixel, with --target-error,
+    /// with --shard or with photons. on: from the second sample on, as long as it pays. Iterations double; each is
+    /// guided by the samples of those before, and weighted by its inverse variance. With --checkpoint and --resume the
+    /// picture is the same bit for bit. on is unsupported with --shard: each part would have to render nearly all
+    /// samples to train the guide; --guide uses a trained one. Without NAME: on. Default: the scene's setting, or off
+    #[
+        arg(
+            long, value_name = "NAME", num_args = 0..=1, default_missing_value = "on",
+            value_parser = names::plain::<GuidingDesc>(), help_heading = "Algorithm"
+        )
+    ]
+    pub guiding: Option<GuidingDesc>,
+    /// As --guiding off
+    #[arg(long, hide = true, overrides_with = "guiding")]
     pub no_guiding: bool,
     /// Guide paths by what another render has learned: the --checkpoint of one with --guiding
     ///
@@ -457,7 +466,7 @@ impl RenderArgs {
             clamp: self.clamp,
             regularize: self.regularize,
             caustics: self.caustics,
-            guiding: switch(self.guiding, self.no_guiding),
+            guiding: if self.no_guiding { Some(GuidingDesc::Off) } else { self.guiding },
             guide: None,
             time_limit: self.time_limit,
             outputs: self.output.clone(),

@@ -2,7 +2,7 @@
 
 use super::*;
 use clap::CommandFactory;
-use steradian::desc::{CausticsDesc, ExrProfileDesc, LayerKind};
+use steradian::desc::{CausticsDesc, ExrProfileDesc, GuidingDesc, LayerKind};
 
 fn render(arguments: &[&str]) -> Result<RenderArgs, clap::Error> {
     let line = ["steradian", "render", "a.json"].iter().chain(arguments);
@@ -47,7 +47,7 @@ fn every_option_reaches_the_overrides() {
         (vec!["a.exr".to_owned(), "b.png".to_owned()], vec!["d.exr".to_owned()])
     );
     assert_eq!((o.exr.profile, o.exr.owner), (Some(ExrProfileDesc::Nuke), Some("b".to_owned())));
-    assert_eq!((o.caustics, o.guiding), (Some(CausticsDesc::Photons), Some(true)));
+    assert_eq!((o.caustics, o.guiding), (Some(CausticsDesc::Photons), Some(GuidingDesc::On)));
     assert!(o.regularize == Some(0.2) && o.no_depth_of_field && o.transparent == Some(true));
     assert_eq!((arguments.verbosity.verbose, arguments.verbosity.quiet), (2, false));
     assert_eq!(render(&["--json", "a.json"]).unwrap().stats, Some("a.json".into()));
@@ -95,16 +95,29 @@ fn switches_have_opposites() {
         }
     };
     let overrides = |line: &str| parsed(line).map(|arguments: Box<RenderArgs>| arguments.overrides(Vec::new()));
-    let three = |line: &str| overrides(line).map(|o| (o.guiding, o.float, o.transparent)).unwrap();
-    assert_eq!(three(""), (None, None, None));
-    assert_eq!(three("--guiding --float --transparent"), (Some(true), Some(true), Some(true)));
-    assert_eq!(three("--no-guiding --no-float --no-transparent"), (Some(false), Some(false), Some(false)));
-    assert_eq!(three("--guiding --no-guiding --no-float --float"), (Some(false), Some(true), None));
+    let two = |line: &str| overrides(line).map(|o| (o.float, o.transparent)).unwrap();
+    assert_eq!(two(""), (None, None));
+    assert_eq!(two("--float --transparent"), (Some(true), Some(true)));
+    assert_eq!(two("--no-float --no-transparent"), (Some(false), Some(false)));
+    assert_eq!(two("--no-float --float"), (Some(true), None));
     assert!(overrides("--no-depth-of-field").unwrap().no_depth_of_field);
     assert!(!overrides("--no-depth-of-field --depth-of-field").unwrap().no_depth_of_field);
     assert!(parsed("--no-denoise --denoise").unwrap().denoise.denoise);
     assert!(!parsed("--denoise --no-denoise").unwrap().denoise.denoise);
-    for wrong in ["--guiding on", "--guiding=on", "--no-spp", "--no-resume"] {
+    let guiding = |line: &str| overrides(line).unwrap().guiding;
+    for (line, expected) in [
+        ("", None),
+        ("--guiding", Some(GuidingDesc::On)),
+        ("--guiding --spp 3", Some(GuidingDesc::On)),
+        ("--guiding auto", Some(GuidingDesc::Auto)),
+        ("--guiding=off", Some(GuidingDesc::Off)),
+        ("--no-guiding", Some(GuidingDesc::Off)),
+        ("--guiding --no-guiding", Some(GuidingDesc::Off)),
+        ("--no-guiding --guiding auto", Some(GuidingDesc::Auto)),
+    ] {
+        assert_eq!(guiding(line), expected, "{line}");
+    }
+    for wrong in ["--no-spp", "--no-resume"] {
         assert!(parsed(wrong).is_err(), "{wrong}");
     }
 }

@@ -5,7 +5,8 @@ use super::{Effort, Outcome, Tests, prepare};
 use crate::accel::{self, AccelKind};
 use crate::film::{Crop, Film, FilmShape, LayerSet, LightAovRequest};
 use crate::integrator::{
-    self, CameraBatch, CameraSample, PassContext, RenderContext, Setup, SurfaceAovs, Workspace, World, dimensions,
+    self, CameraBatch, CameraSample, Guidance, PassContext, RenderContext, Setup, SurfaceAovs, Workspace, World,
+    dimensions,
 };
 use crate::math::Vec2;
 use crate::render::{Overrides, Settings};
@@ -91,7 +92,7 @@ fn run(settings: &Settings, world: &World, to: u32) -> Option<Vec<Checkpoint>> {
         PassContext {
             world,
             render: RenderContext::new(world.scene, [WIDTH; 2], to),
-            guide: None,
+            guidance: Guidance::default(),
             caustics: None,
             continuations: None,
         },

@@ -1,0 +1,182 @@
+//! `--guiding auto`: a pilot decides. Where guiding does not pay the picture is that without it bit for bit; where it
+//! pays, the same for any number of threads, resumed anywhere, and with more samples added later.
+
+use std::sync::atomic::AtomicBool;
+
+use serde_json::{Value, json};
+use steradian::desc::GuidingDesc;
+use steradian::internal::accel::{self, AccelKind};
+use steradian::internal::film::Image;
+use steradian::internal::math::Rng;
+use steradian::internal::render::{self, Overrides, Shard, StateFile};
+
+use crate::checkpoints::{Kit, StopAfter, bits};
+use crate::guiding::room_with_shaft;
+use crate::util::render::{assert_blocks_agree, block_means};
+
+/// The fewest samples that a pilot is traced for.
+const SPP: u32 = 64;
+
+/// Where most light comes by few ways: the pilot finds a ratio of variances of about 2.6.
+fn hard() -> Value {
+    room_with_shaft()
+}
+
+/// A sphere under an even sky.
+fn easy() -> Value {
+    json!({
+        "camera": { "position": [0, 1, 4], "look_at": [0, 0, 0] },
+        "film": { "width": 128, "height": 128, "filter": { "type": "box" } },
+        "integrator": { "type": "path" },
+        "shapes": [
+            { "type": "sphere", "radius": 1 },
+            { "type": "quad", "origin": [-4, -1, 4], "edge_u": [8, 0, 0], "edge_v": [0, 0, -8] }
+        ],
+        "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
+    })
+}
+
+fn overrides(guiding: GuidingDesc, spp: u32) -> Overrides {
+    Overrides { guiding: Some(guiding), spp: Some(spp), threads: Some(2), ..Overrides::default() }
+}
+
+fn kit(scene: &Value, guiding: GuidingDesc, spp: u32) -> Kit {
+    Kit::new(scene, &overrides(guiding, spp))
+}
+
+fn picture(scene: &Value, overrides: &Overrides) -> Image {
+    let kit = Kit::new(scene, overrides);
+    kit.render(Shard::WHOLE).picture(&kit.prepared.settings)
+}
+
+#[test]
+fn an_easy_scene_keeps_its_bits() {
+    let auto = kit(&easy(), GuidingDesc::Auto, SPP);
+    assert!(auto.prepared.settings.has_guiding_pilot());
+    let [auto, off] = [auto, kit(&easy(), GuidingDesc::Off, SPP)].map(|kit| kit.render(Shard::WHOLE));
+    assert!(bits(&auto.film) == bits(&off.film));
+    // The pilot takes rays of its own, few of them.
+    let [with, without] = [auto.rays.total(), off.rays.total()].map(|rays| rays as f64);
+    assert!(with > without && with < 1.02 * without, "{with} {without}");
+}
+
+#[test]
+fn a_hard_scene_is_guided_alike_by_any_number_of_threads() {
+    let of = |guiding, threads| picture(&hard(), &Overrides { threads: Some(threads), ..overrides(guiding, SPP) });
+    let one = of(GuidingDesc::Auto, 1);
+    assert!(one == of(GuidingDesc::Auto, 2) && one == of(GuidingDesc::Auto, 3));
+    assert!(one != of(GuidingDesc::Off, 2));
+}
+
+/// Interrupted before the decision, right after it and later; with more samples than were asked for at first.
+#[test]
+fn a_resumed_render_has_the_bits_of_one_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = StateFile::take(&folder.path().join("a.state")).unwrap();
+    for scene in [hard(), easy()] {
+        let [first, second] = [SPP, SPP + 21].map(|spp| kit(&scene, GuidingDesc::Auto, spp));
+        let reference = second.render(Shard::WHOLE);
+        let tiles = reference.film.tiles().len();
+        let mut rng = Rng::new(11);
+        let mut state = first.start(Shard::WHOLE);
+        let mut stops = Vec::new();
+        for kit in [&first, &second] {
+            state.complete = false;
+            while !state.complete {
+                stops.push(state.done);
+                let stop = AtomicBool::new(false);
+                // Often while there are few samples.
+                let most = 1 + (state.done as usize).pow(2);
+                let progress = StopAfter { tiles: (1 + rng.below(most * tiles) as u32).into(), stop: &stop };
+                let next = kit.kept(&kit.go_on(state, &progress, &stop), &file);
+                state = next;
+            }
+        }
+        assert!(stops.iter().any(|&done| done < 4) && stops.iter().any(|&done| done > 4), "{stops:?}");
+        assert!(bits(&state.whole_film()) == bits(&reference.whole_film()));
+        assert_eq!(state.rays, reference.rays);
+    }
+}
+
+/// By Welch's test on blocks of pixels, whose false alarms are rarer than one in a million.
+#[test]
+fn a_guided_picture_has_the_same_mean() {
+    let blocks = |guiding, first: u64| -> Vec<Vec<f64>> {
+        let picture = |seed| picture(&hard(), &Overrides { seed: Some(seed), ..overrides(guiding, SPP) });
+        (first..first + 8).map(|seed| block_means(&picture(seed))).collect()
+    };
+    let [mut guided, mut plain] = [blocks(GuidingDesc::Auto, 1), blocks(GuidingDesc::Off, 101)];
+    // The outside of the shaft is black in all of them.
+    let is_lit: Vec<bool> =
+        (0..plain[0].len()).map(|block| guided.iter().chain(&plain).any(|means| means[block] > 0.0)).collect();
+    for means in guided.iter_mut().chain(&mut plain) {
+        let mut lit = is_lit.iter();
+        means.retain(|_| lit.next().is_some_and(|lit| *lit));
+    }
+    assert!(plain[0].len() > 200, "{}", plain[0].len());
+    assert_blocks_agree(&guided, &plain, "guided against not");
+}
+
+/// A pilot would depend on the samples of other parts: shards are those of a render without guiding.
+#[test]
+fn shards_are_not_guided() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut kit = kit(&hard(), GuidingDesc::Auto, SPP);
+    let shards = (1..=2).map(|index| Shard { index, count: 2 });
+    kit.prepared.settings = kit.prepared.settings.of_shard(Shard { index: 1, count: 2 });
+    let paths: Vec<_> = shards
+        .map(|shard| {
+            let path = folder.path().join(format!("{}.shard", shard.index));
+            kit.kept(&kit.render(shard), &StateFile::take(&path).unwrap());
+            path
+        })
+        .collect();
+    let merged = render::merge(&paths, false).unwrap();
+    let off = self::kit(&hard(), GuidingDesc::Off, SPP).render(Shard::WHOLE);
+    assert!(merged.state.film.resolve() == off.film.resolve());
+    assert!(merged.header.settings.get("integrator.guiding").is_none_or(|guiding| guiding == "off"));
+}
+
+#[test]
+fn pilots_are_traced_only_where_they_can_pay() {
+    let has_pilot = |change: &dyn Fn(&mut Value), overrides: Overrides| {
+        let mut scene = hard();
+        change(&mut scene);
+        Kit::new(&scene, &overrides).prepared.settings.has_guiding_pilot()
+    };
+    let auto = || overrides(GuidingDesc::Auto, SPP);
+    let same = |_: &mut Value| {};
+    assert!(has_pilot(&same, auto()));
+    assert!(!has_pilot(&same, overrides(GuidingDesc::Auto, SPP - 1)));
+    assert!(!has_pilot(&same, overrides(GuidingDesc::On, SPP)));
+    assert!(!has_pilot(&same, Overrides { target_error: Some(0.01), ..auto() }));
+    assert!(!has_pilot(&same, Overrides { size: Some([64, 64]), ..auto() }));
+    assert!(!has_pilot(&same, Overrides { max_depth: Some(2), ..auto() }));
+    assert!(!has_pilot(&|scene| scene["integrator"]["strategy"] = json!("bsdf"), auto()));
+    assert!(!has_pilot(&|scene| scene["integrator"]["caustics"] = json!("photons"), auto()));
+    assert!(!has_pilot(&|scene| scene["integrator"] = json!({ "type": "whitted" }), auto()));
+}
+
+#[test]
+fn samples_that_may_be_guided_are_not_replayed() {
+    let kit = kit(&hard(), GuidingDesc::Auto, SPP);
+    let scene = &kit.prepared.scene;
+    let accel = accel::build(AccelKind::EMBREE, &scene.geometry, 1).unwrap();
+    let replay = |sample| render::replay(scene, &*accel, &kit.prepared.settings, [3, 5], sample);
+    assert!(replay(3).is_ok());
+    let error = replay(4).unwrap_err().to_string();
+    assert!(error.contains("`pixel`") && error.contains("`guiding` off"), "{error}");
+}
+
+/// A crop is decided on by its own samples.
+#[test]
+fn crops_have_pilots_of_their_own() {
+    let crop = |threads| {
+        let overrides =
+            Overrides { crop: Some([20, 31, 97, 91]), threads: Some(threads), ..overrides(GuidingDesc::Auto, 2 * SPP) };
+        picture(&hard(), &overrides)
+    };
+    let image = crop(2);
+    assert_eq!(image.crop.area(), 97 * 91);
+    assert!(image == crop(1));
+}
