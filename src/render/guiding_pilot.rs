@@ -1,9 +1,9 @@
 //! The pilot of path guiding: samples of some pixels from all over the picture, with a guide that has learned from the
-//! picture's first samples. They tell how much more variance paths have without the guide, and are not part of the
+//! picture's first samples. They show how much more variance paths have without the guide, and are not part of the
 //! picture: what is decided by them favours no sample of it.
 //!
 //! Unguided paths that are as few hardly ever find the light that a guide leads to, and seem to have little variance.
-//! Guided paths find it, and the ratio of the densities tells what it would add to the variance without the guide.
+//! Guided paths find it, and the ratio of the densities gives what it would add to the variance without the guide.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -22,7 +22,7 @@ const PIXELS_PER_PIXEL: f64 = 1.0 / 128.0;
 /// The fewest and the most of them.
 const PIXELS: [f64; 2] = [512.0, 8192.0];
 
-/// Samples of a pilot pixel with and without the guide; the latter tell the brightness and the rays of a path alone.
+/// Samples of a pilot pixel with and without the guide; the latter give the brightness and the rays of a path alone.
 const SAMPLES: u32 = 16;
 const UNGUIDED_SAMPLES: u32 = 2;
 
@@ -208,10 +208,9 @@ impl PilotSamples {
         // Relative variances: the guided one, and how much more it is without guide.
         let mut parts = [[0.0; 2]; PARTS];
         for (i, pixel) in self.pixels.iter().enumerate() {
-            let color = self.around(i);
             let part = &mut parts[hash64(i as u64) as usize % PARTS];
-            for k in 0..3 {
-                let weight = 1.0 / (color[k] * color[k] + floor);
+            for (k, color) in self.around(i).into_iter().enumerate() {
+                let weight = 1.0 / (color * color + floor);
                 let variance = (pixel.square[k] - pixel.radiance[k] * pixel.radiance[k]).max(0.0);
                 part[0] += weight * variance * count / (count - 1.0);
                 part[1] += weight * pixel.excess[k];

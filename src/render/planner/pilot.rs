@@ -1,6 +1,6 @@
 //! Renders for which a pilot decides whether paths are guided.
 //!
-//! A guide learns from the first samples, which are those of a render without guiding. Then the pilot tells whether it
+//! A guide learns from the first samples, which are those of a render without guiding. Then the pilot decides whether it
 //! pays. Nothing here depends on the number of samples, so that more can be added to a picture.
 
 use super::training_schedule::next_refinement;
@@ -41,7 +41,7 @@ impl PilotPlanner {
         self.guide = self.guide.refined(done);
     }
 
-    /// Takes the pilot without guide, which tells how bright the scene is.
+    /// Takes the pilot without guide, which measures how bright the scene is.
     pub fn begin(&mut self, unguided: PilotSamples) {
         self.guide.set_typical(unguided.mean() as f32);
         self.unguided = Some(unguided);

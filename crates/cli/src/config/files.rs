@@ -57,7 +57,7 @@ mod tests {
             "size=64x32 s.toml:4",
             "crop=1,2,3,4 s.toml:5",
             "output=a.exr;b.png s.toml:6",
-            "guiding=true s.toml:7",
+            "guiding=on s.toml:7",
             "float=true s.toml:8",
             "exr.crypto_depth=4 s.toml:9",
             "exr.profile=nuke s.toml:9",
