@@ -1,7 +1,7 @@
 //! Renders for which a pilot decides whether paths are guided.
 //!
-//! A guide learns from the first samples, which are those of a render without guiding. Then the pilot decides whether it
-//! pays. Nothing here depends on the number of samples, so that more can be added to a picture.
+//! A guide learns from the first samples, which are those of a render without guiding. Then the pilot decides whether
+//! it pays. Nothing here depends on the number of samples, so that more can be added to a picture.
 
 use super::training_schedule::next_refinement;
 use crate::bytes::{ByteReader, ByteWriter};
