@@ -98,7 +98,7 @@ pub enum VolumeDesc {
         /// must be given.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         file: Option<String>,
-        /// The name of a grid of a `.vdb` or `.nvdb` file. Default: that of the key that the volume stands for, such as
+        /// The name of a grid of a `.vdb` or `.nvdb` file. Default: that of the key, such as
         /// `density`, if the file has such a grid; else its only one.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         grid: Option<String>,

@@ -24,7 +24,7 @@ use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::prefetch::prefetch;
 use crate::math::random::hash64;
 use crate::math::rows::BATCH;
-use crate::math::{Aabb, Vec3, ln_of};
+use crate::math::{Aabb, Vec3};
 use directions::square_of;
 use quadtree::{Descent, DirectionRecords};
 use space::{MAX_DEPTH, Node, SpaceTrees};
@@ -87,7 +87,7 @@ impl Leaf {
         }
         let usual = BSDF_SAMPLING_FRACTION * bsdf + (1.0 - BSDF_SAMPLING_FRACTION) * guide;
         for (sum, fraction) in self.gains.iter().zip(OTHER_FRACTIONS) {
-            let gain = ln_of((fraction * bsdf + (1.0 - fraction) * guide) / usual);
+            let gain = ((fraction * bsdf + (1.0 - fraction) * guide) / usual).ln();
             sum.fetch_add((amount * gain) as i64, Ordering::Relaxed);
         }
     }

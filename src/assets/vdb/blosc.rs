@@ -1,6 +1,6 @@
 //! Chunks of Blosc 1, whose format is that of c-blosc's `README_CHUNK_FORMAT.rst`: a header of 16 bytes, then either
 //! the bytes as they are, or the places of blocks. A block is one stream or, without a flag and if it is large enough,
-//! one for each byte of a value; a stream is its length and LZ4, or as long as what it stands for and not compressed.
+//! one for each byte of a value; a stream is its length and LZ4, or as long as its contents and not compressed.
 //! The bytes of values may be shuffled: the first of all, then the second of all.
 
 use super::cursor::Cursor;

@@ -39,7 +39,7 @@ impl Decoder {
     }
 }
 
-/// The most bytes that so many can be decompressed to: a code of deflate, of at least two bits, stands for at most 258
+/// The most bytes that so many can be decompressed to: a code of deflate, of at least two bits, makes at most 258
 /// bytes, and a byte of LZ4 for at most 255.
 pub fn most_decompressed(codec: Codec, bytes: u64) -> u64 {
     match codec {

@@ -94,9 +94,10 @@ impl MediumTable {
         let brightness = if is_grid { 1.0 } else { params.number_or("Lescale", 1.0)? as f32 };
         let radiance = if is_rgb_grid { None } else { colors.get(params, "Le", Meaning::Emission)? };
         // Black bodies have a colour of their own.
-        let has_heat = volume.as_ref().is_some_and(|volume| volume.emission.is_some());
-        let glows = kind == "uniformgrid" && params.has("temperature") || kind == "nanovdb" && has_heat;
-        let radiance = if glows { [1.0; 3] } else { radiance.unwrap_or([0.0; 3]) };
+        let has_volume_emission = volume.as_ref().is_some_and(|volume| volume.emission.is_some());
+        let is_blackbody =
+            kind == "uniformgrid" && params.has("temperature") || kind == "nanovdb" && has_volume_emission;
+        let radiance = if is_blackbody { [1.0; 3] } else { radiance.unwrap_or([0.0; 3]) };
         let emission = [0, 1, 2].map(|i| radiance[i].max(0.0) * brightness * absorption[i]);
         let g = params.number_or("g", 0.0)?;
         if g.abs() > MAX_G {

@@ -57,10 +57,10 @@ impl MediumDirective<'_> {
         let path = self.colors.folder.join(file);
         let place = format!("{}: {}", params.place, params.element);
         let error = |error: AssetError| error.at(self.scene, &place, &path);
-        let has_heat = list_vdb(&path).map_err(error)?.iter().any(|(name, _)| name == "temperature");
-        let emission = if has_heat {
+        let has_temperature = list_vdb(&path).map_err(error)?.iter().any(|(name, _)| name == "temperature");
+        let emission = if has_temperature {
             let read = |name| read_vdb(&path, GridChoice { name: Some(name), default: name }).map_err(error);
-            self.heat(draft, &read("density")?, &read("temperature")?)?
+            self.blackbody_emission(draft, &read("density")?, &read("temperature")?)?
         } else {
             let why = "the file has no grid named \"temperature\"";
             for name in ["Lescale", "temperaturescale", "temperatureoffset", "temperaturecutoff"] {
@@ -73,11 +73,16 @@ impl MediumDirective<'_> {
     }
 
     /// The radiance of black bodies at the voxels of `density`.
-    fn heat(&self, draft: &mut Draft, density: &VdbGrid, heat: &VdbGrid) -> Result<Option<VolumeDesc>> {
+    fn blackbody_emission(
+        &self,
+        draft: &mut Draft,
+        density: &VdbGrid,
+        temperature: &VdbGrid,
+    ) -> Result<Option<VolumeDesc>> {
         let params = self.params;
-        let shift = DVec3::from([0, 1, 2].map(|axis| (heat.origin[axis] - density.origin[axis]) as f64));
-        let map = density.world_from_voxels.inverse() * heat.world_from_voxels;
-        if !map.abs_diff_eq(DAffine3::from_translation(shift), MAX_SHIFT) || heat.voxels.channels != 1 {
+        let shift = DVec3::from([0, 1, 2].map(|axis| (temperature.origin[axis] - density.origin[axis]) as f64));
+        let map = density.world_from_voxels.inverse() * temperature.world_from_voxels;
+        if !map.abs_diff_eq(DAffine3::from_translation(shift), MAX_SHIFT) || temperature.voxels.channels != 1 {
             let why = "the grid has no numbers at the same places as the density: nothing is emitted";
             draft.ignored(&params.place, &params.element, "temperature", why);
             return Ok(None);
@@ -87,11 +92,11 @@ impl MediumDirective<'_> {
         let value = |i: i64| {
             let at = [i % nx, i / nx % ny, i / nx / ny];
             let inside = [0, 1, 2].map(|axis| {
-                let last = i64::from(heat.voxels.resolution[axis]) - 1;
-                (at[axis] + density.origin[axis] - heat.origin[axis]).clamp(0, last) as usize
+                let last = i64::from(temperature.voxels.resolution[axis]) - 1;
+                (at[axis] + density.origin[axis] - temperature.origin[axis]).clamp(0, last) as usize
             });
-            let [width, height, _] = heat.voxels.resolution.map(|edge| edge as usize);
-            [heat.voxels.values[(inside[2] * height + inside[1]) * width + inside[0]]]
+            let [width, height, _] = temperature.voxels.resolution.map(|edge| edge as usize);
+            [temperature.voxels.values[(inside[2] * height + inside[1]) * width + inside[0]]]
         };
         let temperatures: Vec<[f32; 1]> = (0..nx * ny * nz).map(value).collect();
         let offset = match params.number("temperatureoffset")? {
