@@ -2,11 +2,11 @@
 //! same bits however a render is split.
 
 use serde_json::{Value, json};
-use steradian::Error;
 use steradian::desc::{IntegratorDesc, RouletteDesc};
 use steradian::internal::accel::AccelKind;
 use steradian::internal::film::{Image, LayerKind};
-use steradian::internal::render::{Overrides, Settings};
+use steradian::internal::render::{Overrides, RenderResult, Settings};
+use steradian::{Error, RayCounts};
 
 use crate::checkpoints::assert_resumed_split_and_replayed;
 use crate::util::render::{assert_blocks_agree, block_means, prepare, render_with};
@@ -75,6 +75,28 @@ fn errors_times_rays_are_less_than_without_roulette() {
     };
     let (auto, off) = (cost(RouletteDesc::Auto), cost(RouletteDesc::Off));
     assert!(auto < 0.75 * off, "{auto} {off}");
+}
+
+/// A metal ball reflects walls; the lamp is mostly outside of its lobe, and what shadow rays would carry is little.
+#[test]
+fn shadow_rays_that_carry_little_are_traced_less_often() {
+    let mut scene = room();
+    scene["camera"] = json!({ "position": [0.6, 0.5, 1.5], "look_at": [0.6, 0.4, 0.3], "vertical_fov_degrees": 25 });
+    scene["materials"]["coat"] = json!({ "type": "conductor", "metal": "gold", "roughness": 0.1 });
+    scene["shapes"][9]["origin"] = json!([0.4, 1.9, 1.0]);
+    let renders = |roulette, first: u64| -> Vec<RenderResult> {
+        let render = |seed| render_with(&prepare(&scene, &overrides(roulette, seed, 32)), AccelKind::EMBREE);
+        (first..first + 8).map(render).collect()
+    };
+    let (off, auto) = (renders(RouletteDesc::Throughput, 0), renders(RouletteDesc::Auto, 100));
+    let share = |rendered: &[RenderResult]| {
+        let sum = |of: fn(&RayCounts) -> u64| rendered.iter().map(|rendered| of(&rendered.stats.rays)).sum::<u64>();
+        sum(|rays| rays.shadow) as f64 / sum(|rays| rays.camera + rays.indirect) as f64
+    };
+    assert!(share(&auto) < 0.8 * share(&off), "{} {}", share(&auto), share(&off));
+    let blocks =
+        |rendered: &[RenderResult]| rendered.iter().map(|rendered| block_means(&rendered.image)).collect::<Vec<_>>();
+    assert_blocks_agree(&blocks(&auto), &blocks(&off), "shadow rays");
 }
 
 #[test]

@@ -376,7 +376,7 @@ pub enum RouletteDesc {
     #[default]
     Throughput,
     /// From the first scattering on, by what a path may add to its pixel and by what it costs, as a pilot of an eighth
-    /// of a sample of each pixel finds both. `rr_depth` is ignored.
+    /// of a sample of each pixel finds both; shadow rays by what they carry. `rr_depth` is ignored.
     Auto,
     /// Never.
     Off,

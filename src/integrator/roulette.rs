@@ -93,6 +93,8 @@ pub struct ContinuationGrid {
     cells_per_unit: f32,
     /// By cell and side.
     roots: Vec<f32>,
+    /// What a ray that finds a radiance of 1 counts as: the factor that is in all roots.
+    scale: f32,
 }
 
 /// Sums over the records of a cell.
@@ -132,6 +134,7 @@ impl ContinuationGrid {
             corner: bounds.min,
             cells_per_unit: if size > 0.0 && size < f32::INFINITY { LEVELS[2] as f32 / size } else { 0.0 },
             roots: Vec::new(),
+            scale: 1.0,
         };
         let mut all = CellSums::default();
         let mut levels = LEVELS.map(|side| vec![CellSums::default(); side * side * side * SIDES]);
@@ -154,7 +157,16 @@ impl ContinuationGrid {
 
     /// Multiplies all roots.
     pub fn scale(&mut self, factor: f32) {
+        self.scale *= factor;
         self.roots.iter_mut().for_each(|root| *root *= factor);
+    }
+
+    /// With which probability a shadow ray that carries `contribution` is traced.
+    #[inline(always)]
+    pub(super) fn shadow_ray_probability(&self, contribution: f32, rr_scale: f32) -> f32 {
+        let value = contribution * rr_scale * self.scale;
+        // NaN becomes 1: it must be seen in the sample.
+        if value < 1.0 { value } else { 1.0 }
     }
 
     /// The roots at the first `count` points, whose normals are turned to the side on which `cos_side` is positive.
@@ -244,6 +256,8 @@ mod tests {
         let mut scaled = grid.clone();
         scaled.scale(2.0);
         assert_eq!(found(&scaled, 0.3, true), 2.0 * found(&grid, 0.3, true));
+        let shadow_rays = |contribution| scaled.shadow_ray_probability(contribution, 0.5);
+        assert_eq!([0.0, 0.25, 1.0, 3.0, f32::NAN].map(shadow_rays), [0.0, 0.25, 1.0, 1.0, 1.0]);
     }
 
     #[test]

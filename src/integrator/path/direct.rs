@@ -7,14 +7,14 @@ use super::guided::Regions;
 use super::terminator::{self, TerminatorRays};
 use super::wave::Wave;
 use crate::geometry::SpawnPoint;
-use crate::integrator::Strategy;
 use crate::integrator::shading::terminator_factor;
 use crate::integrator::vertex::HemisphereTest;
+use crate::integrator::{ContinuationGrid, Strategy};
 use crate::light::{LightContext, LightQueries, LightQueue, LightSampleRows, light_target};
 use crate::math::Vec3;
 use crate::math::rows::BATCH;
 use crate::math::vectorize::vectorize;
-use crate::sampling::power_heuristic;
+use crate::sampling::{SampleRows, power_heuristic};
 
 /// Samples light for the vertices of a block, and finds the shadow rays.
 pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wave, block: usize) {
@@ -32,12 +32,15 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
     if let Some(regions) = regions {
         guided.mix_light_pdfs(regions, vertices);
     }
-    let Vertices { rows, points, light_samples: lights, light_evals: evals, direct, .. } = &mut *vertices;
+    let Vertices { rows, points, light_samples: lights, light_evals: evals, direct, u_bsdf, .. } = &mut *vertices;
     let is_mis = context.config.strategy == Strategy::Mis;
     if context.scene.features.normal_perturbations {
         vectorize!(illuminate::<true>(rows, points, lights, evals, direct, is_mis, count));
     } else {
         vectorize!(illuminate::<false>(rows, points, lights, evals, direct, is_mis, count));
+    }
+    if let Some(grid) = context.pass.continuations {
+        vectorize!(play_roulette(grid, rows, direct, u_bsdf, count));
     }
     if context.scene.features.shading_normals {
         wave.counts.shadow += offset_below_facets(context, vertices, terminator_rays);
@@ -107,6 +110,25 @@ fn illuminate<const PERTURBED: bool>(
         direct.shadow_origin.set(i, choose_vector(near.origin, far.origin));
         direct.shadow_direction.set(i, choose_vector(near.direction, far.direction));
         direct.shadow_end[i] = choose(near.t_max, far.t_max);
+    }
+}
+
+/// Drops shadow rays that carry little, and makes up for them by the others.
+#[inline(always)]
+fn play_roulette(
+    grid: &ContinuationGrid,
+    rows: &VertexRows,
+    direct: &mut DirectRows,
+    u_bsdf: &SampleRows,
+    count: usize,
+) {
+    for i in 0..count.min(BATCH) {
+        let contribution = direct.contribution.get(i);
+        let probability = grid.shadow_ray_probability(contribution.max_channel(), rows.rr_scale[i]);
+        // The number by which the path goes on, from its other end: what traces few shadow rays goes on more often.
+        let is_traced = 1.0 - u_bsdf.of(i)[3] <= probability;
+        direct.contribution.set(i, contribution * (1.0 / probability));
+        direct.status[i] = if is_traced { direct.status[i] } else { spawn::NONE };
     }
 }
 
