@@ -7,9 +7,11 @@ use std::path::Path;
 
 use steradian::internal::assets;
 use steradian::internal::assets::{GridChoice, MeshData};
+use steradian::internal::bsdf::Measured;
 use steradian::internal::config::{self, Trust};
 use steradian::internal::geometry::{CurveBasis, CurveKind, Curves, Strands};
 use steradian::internal::import::{self, ImportOptions};
+use steradian::internal::math::{Vec3, vec3};
 use steradian::internal::render::RenderProvenance;
 
 /// The most grids of a volume file that are read, and the most bytes of their voxels: a cube of one value takes few
@@ -87,6 +89,20 @@ pub fn read(kind: &str, data: &[u8], folder: &Path) {
                 assert!(!listed.is_empty() && grid.world_from_voxels.is_finite());
                 let voxels: usize = grid.voxels.resolution.iter().map(|&edge| edge as usize).product();
                 assert_eq!(grid.voxels.values.len(), voxels * grid.voxels.channels as usize);
+            }
+        }
+        "measured" => {
+            if let Ok(data) = assets::read_measured(&write("m.bsdf", data)) {
+                let measured = Measured::new(data);
+                for wo in [Vec3::Z, vec3(0.6, 0.0, 0.8), vec3(-0.48, -0.64, -0.6)] {
+                    assert!(measured.albedo(wo).to_array().iter().all(|c| !c.is_nan()));
+                    for u in [[0.0, 0.0], [0.3, 0.8], [0.5, 0.5], [0.99, 0.999]] {
+                        let Some(sample) = measured.sample(wo, 0.5, u) else { continue };
+                        let eval = measured.eval(wo, sample.wi);
+                        assert!(eval.pdf > 0.0 && eval.pdf == sample.pdf, "{eval:?} {sample:?}");
+                        assert!(eval.value.to_array().iter().all(|c| c.is_finite() && *c >= 0.0), "{eval:?}");
+                    }
+                }
             }
         }
         "mitsuba_xml" => read_scene(&write("s.xml", data)),

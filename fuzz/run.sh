@@ -7,7 +7,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 seconds=${1:-1200}
 shift || true
-kinds=${*:-scene_json obj ply strands image mitsuba_xml pbrt gltf recipe config volume vdb}
+kinds=${*:-scene_json obj ply strands image mitsuba_xml pbrt gltf recipe config volume vdb measured}
 
 [ -d fuzz/corpus ] || tar -xzf fuzz/corpus.tar.gz -C fuzz
 for kind in $kinds; do

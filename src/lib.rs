@@ -14,7 +14,7 @@
 //! | # | modules |
 //! |---|---|
 //! | 0 | `id`, `error`, `memory`, `metal`, `printable`, `suggestion`, `bytes` |
-//! | 1 | `math`, `desc`, `file`, `attribute`, `image_data`, `spectrum` |
+//! | 1 | `math`, `desc`, `file`, `attribute`, `image_data`, `measured`, `spectrum` |
 //! | 2 | `color`, `sampling`, `config`, `subdivision` |
 //! | 3 | `assets`, `geometry`, `texture`, `bsdf`, `camera`, `film`, `guiding` |
 //! | 4 | `accel`, `material`, `medium`, `opacity`, `normal_perturbation`, `light`, `output` |
@@ -50,6 +50,7 @@ mod live;
 mod loading;
 mod material;
 mod math;
+mod measured;
 mod medium;
 mod memory;
 mod metal;

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use flate2::read::GzDecoder;
 
-const KINDS: [&str; 12] = [
+const KINDS: [&str; 13] = [
     "scene_json",
     "obj",
     "ply",
@@ -24,6 +24,7 @@ const KINDS: [&str; 12] = [
     "strands",
     "volume",
     "vdb",
+    "measured",
 ];
 
 fn check(kind: &str, bytes: &[u8], folder: &Path, file: &Path) {

@@ -95,6 +95,8 @@ mod live_tev;
 mod many_lights;
 /// Materials as scenes use them.
 mod materials;
+/// Measured materials.
+mod measured_materials;
 /// Media that overlap, absorb and part colours.
 mod media;
 /// What moves while the shutter is open: the same for every accelerator, and as if it stood still at each time.

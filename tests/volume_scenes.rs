@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 use steradian::ErrorKind;
-use steradian::internal::assets::{GridChoice, read_vdb};
+use steradian::internal::assets::{GridChoice, read_rgb_image, read_vdb};
 use steradian::internal::convert::{Originals, write_scene};
 use steradian::internal::import::{ImportOptions, read_scene};
 use steradian::internal::math::{DVec3, Rng};
@@ -12,6 +12,7 @@ use steradian::internal::scene::Scene;
 
 use crate::bad_input::assert_error;
 use crate::util::folder::{Folder, good_scene, set};
+use crate::util::program::{run, stderr_of};
 use crate::util::root;
 
 /// A folder with a file of the same name.
@@ -189,13 +190,53 @@ fn nanovdb_media_of_pbrt_have_density_and_temperature() {
         bright += usize::from(color[0] > 0.0);
     }
     assert!(bright > 10, "{bright}");
-    for (text, expected) in [
-        ("", "filename"),
-        ("\"string filename\" \"gone.nvdb\"", "gone.nvdb"),
-        ("\"string filename\" \"several_zip.nvdb\"", "several grids named \"density\""),
-    ] {
+    for (text, expected) in
+        [("", "filename"), ("\"string filename\" \"several_zip.nvdb\"", "several grids named \"density\"")]
+    {
         let error = read(text).err().unwrap().to_string();
         assert!(error.contains(expected), "{error}");
+    }
+}
+
+#[test]
+fn media_without_their_files_are_empty_where_that_is_allowed() {
+    let folder = Folder::new();
+    let ball = |density: &Value| {
+        json!({ "film": { "width": 4, "height": 4 }, "camera": { "position": [0, 0, 9], "look_at": [0, 0, 0] },
+            "sampler": { "spp": 1 }, "lights": [{ "type": "environment", "radiance": [0.5, 0.5, 0.5] }],
+            "media": { "fog": { "absorption": 9, "emission": 5, "volume": { "density": density } } },
+            "materials": { "m": { "type": "dielectric", "ior": 1, "medium": "fog" } },
+            "shapes": [{ "type": "sphere", "radius": 5, "material": "m" }] })
+    };
+    for (name, file) in [("a", "gone.vdb"), ("b", "gone.nvdb"), ("c", "gone.vol"), ("d", "gone.raw")] {
+        let mut density = grid(file);
+        if name == "d" {
+            density["resolution"] = json!([2, 2, 2]);
+        }
+        folder.write(&format!("{name}.json"), ball(&density).to_string());
+    }
+    let xml = r#"<scene version="3.0.0"><integrator type="volpath"/><sensor type="perspective"><film type="hdrfilm">
+        <integer name="width" value="4"/><integer name="height" value="4"/></film></sensor>
+        <emitter type="constant"><rgb name="radiance" value="0.5"/></emitter><shape type="sphere">
+        <float name="radius" value="5"/><bsdf type="null"/><medium type="heterogeneous" name="interior">
+        <volume type="gridvolume" name="sigma_t"><string name="filename" value="gone.vol"/></volume>
+        </medium></shape></scene>"#;
+    folder.write("e.xml", xml);
+    let pbrt = "Film \"rgb\" \"integer xresolution\" 4 \"integer yresolution\" 4\nCamera \"perspective\"\nWorldBegin\n\
+                LightSource \"infinite\" \"rgb L\" [0.5 0.5 0.5]\nMakeNamedMedium \"m\" \"string type\" \"nanovdb\" \
+                \"string filename\" \"gone.nvdb\" \"rgb sigma_a\" [9 9 9]\nMediumInterface \"m\" \"\"\n\
+                Material \"interface\"\nShape \"sphere\" \"float radius\" 5\n";
+    folder.write("f.pbrt", pbrt);
+    for name in ["a.json", "b.json", "c.json", "d.json", "e.xml", "f.pbrt"] {
+        let output = run(folder.path("").as_path(), &format!("render {name} --spp 1 -o a.exr"));
+        let words = stderr_of(&output);
+        assert_eq!(output.status.code(), Some(4), "{name}: {words}");
+        assert!(words.contains("gone."), "{name}: {words}");
+        let output = run(folder.path("").as_path(), &format!("render {name} --spp 1 -o a.exr --allow-missing"));
+        let words = stderr_of(&output);
+        assert!(output.status.success() && words.contains("no file gone."), "{name}: {words}");
+        let pixel = read_rgb_image(&folder.path("a.exr")).unwrap().pixels[5];
+        assert!(pixel.iter().all(|c| (c - 0.5).abs() < 1e-3), "{name}: {pixel:?}");
     }
 }
 

@@ -43,7 +43,7 @@ def render(scene, name, folder, *options):
 def main(wanted):
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
-        for part in ("meshes", "textures"):
+        for part in ("meshes", "textures", "measured"):
             (folder / part).symlink_to(ROOT / "scenes" / part)
         for scene in sorted((BOOK / "scenes").glob("room_*.json")):
             if not wanted or scene.stem in wanted:

@@ -1,4 +1,4 @@
-//! Assets, which a scene names: meshes, images, volumes and light profiles, read from files to buffers that nobody has
+//! Assets, which a scene names: meshes, images, volumes, light profiles and measured BRDFs, read from files to buffers that nobody has
 //! checked, or made by the reader of a scene format.
 
 mod environment_image;
@@ -15,6 +15,7 @@ mod ply;
 mod ply_attributes;
 mod source;
 mod strands;
+mod tensors;
 mod vdb;
 mod volume;
 
@@ -29,6 +30,7 @@ pub use obj::{ObjMaterial, ObjMesh, read_obj};
 pub use ply::{read_ply, read_ply_attributes};
 pub use source::SceneSource;
 pub use strands::{StrandData, read_strands};
+pub use tensors::{TENSOR_MAGIC, read_measured};
 pub use vdb::{GridChoice, VDB_MAGICS, VdbGrid, list_vdb, read_vdb, read_vdb_within};
 pub use volume::{VolHeader, VolumeData, read_raw_volume, read_vol, read_vol_header, vol_bytes};
 

@@ -16,6 +16,7 @@ pub mod fresnel;
 mod glossy;
 mod hair;
 mod lambert;
+mod measured;
 mod microfacet;
 mod mirror;
 mod phase;
@@ -41,6 +42,7 @@ pub use flags::BsdfFlags;
 pub use glossy::Glossy;
 pub use hair::{Hair, hair_absorption, hair_absorption_of_color};
 pub use lambert::{DiffuseDirection, Lambert};
+pub use measured::Measured;
 pub use microfacet::{Ggx, Microfacets, SMOOTH_ALPHA, SeparableGgx};
 pub use mirror::Mirror;
 pub use phase::{MAX_PHASE_LOBES, Phase, PhaseLobe, WeightedLobe};
@@ -133,6 +135,8 @@ pub enum Bsdf {
     Phase(Phase),
     /// A hair.
     Hair(Hair),
+    /// Measured reflection.
+    Measured(Measured),
 }
 
 // Constructed at every hit: no kind may make the others slower to pass around.
@@ -157,6 +161,7 @@ macro_rules! each {
             Bsdf::SeparableGgx($bsdf) => $body,
             Bsdf::Phase($bsdf) => $body,
             Bsdf::Hair($bsdf) => $body,
+            Bsdf::Measured($bsdf) => $body,
         }
     };
 }

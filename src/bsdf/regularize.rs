@@ -6,7 +6,7 @@ use super::{Bsdf, Coated, Microfacets, SingleScatteringBsdf};
 impl Bsdf {
     /// The same scattering with an alpha of at least `alpha`, within `[0, 1]`, along both tangents; what lies below a
     /// coat and how much the coat lets through stay. `None` if nothing is narrower: diffuse and ideally smooth
-    /// surfaces, and Phong's own lobe, stay as they are.
+    /// surfaces, Phong's own lobe and what was measured stay as they are.
     pub fn with_min_alpha(&self, alpha: f32) -> Option<Self> {
         Some(match self {
             Self::Conductor(bsdf) => Self::Conductor(bsdf.with_alpha(widened(bsdf.alpha(), alpha)?)),
@@ -27,9 +27,8 @@ impl Bsdf {
             | Self::ThinDielectric(_)
             | Self::Phong(_)
             | Self::Phase(_)
-            | Self::Hair(_) => {
-                return None;
-            }
+            | Self::Hair(_)
+            | Self::Measured(_) => return None,
         })
     }
 }

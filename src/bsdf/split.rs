@@ -7,13 +7,16 @@ use crate::math::Vec3;
 impl Bsdf {
     /// The share, by channel, of diffuse reflection in the value of [`eval`](Self::eval), for directions on the same
     /// side: within `[0, 1]`, 0 where all of it is specular. The sheen counts as diffuse, and light that microfacets
-    /// scatter several times as specular. Delta lobes, which have no value, are specular.
+    /// scatter several times and all that was measured as specular. Delta lobes, which have no value, are specular.
     pub fn diffuse_fraction(&self, wo: Vec3, wi: Vec3) -> Rgb {
         match self {
             Self::Lambert(_) | Self::Eon(_) | Self::DiffuseTransmission(_) | Self::Phase(_) => Rgb::WHITE,
-            Self::Mirror(_) | Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) | Self::Hair(_) => {
-                Rgb::BLACK
-            }
+            Self::Mirror(_)
+            | Self::Conductor(_)
+            | Self::Dielectric(_)
+            | Self::ThinDielectric(_)
+            | Self::Hair(_)
+            | Self::Measured(_) => Rgb::BLACK,
             Self::Glossy(bsdf) => bsdf.diffuse_fraction(wo, wi),
             Self::Phong(bsdf) => bsdf.diffuse_fraction(wo, wi),
             Self::Plastic(bsdf) => bsdf.diffuse_fraction(wo, wi),

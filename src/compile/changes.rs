@@ -114,6 +114,8 @@ fn changed_material(
     }
     let (textures, media) = (TextureTable::default(), NamedMedia::default());
     let mut table = MaterialTable::default();
-    let added = table.add(&Compiler { files, textures: &textures, media: &media }, desc, name, &mut Vec::new()).ok()?;
+    let used = desc.used_names();
+    let compiler = Compiler { files, textures: &textures, media: &media, used: &used };
+    let added = table.add(&compiler, desc, name, &mut Vec::new()).ok()?;
     table.is_plain(added).then(|| (id, table.materials.swap_remove(added.index())))
 }

@@ -6,19 +6,15 @@ use super::CompileContext;
 use super::faults::Faults;
 use super::media::NamedMedia;
 use super::textures::{TextureTable, TextureUse};
-use crate::bsdf::{
-    Beckmann, BsdfFlags, Coat, Conductor, Ggx, Lambert, SeparableGgx, diffuse_mean, mitsuba_diffuse_mean,
-};
+use crate::bsdf::{BsdfFlags, Conductor, Lambert};
 use crate::color::Rgb;
 use crate::desc::{
-    ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, PlasticDesc, RangedDesc, RoughnessDesc,
-    ScalarDesc, SceneDesc, UsedNames,
+    ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, RangedDesc, RoughnessDesc, ScalarDesc,
+    SceneDesc, UsedNames,
 };
 use crate::error::Result;
 use crate::id::{MaterialId, NormalPerturbationId, TextureId};
-use crate::material::{
-    AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, RangedInput, ScalarInput, TexturedMaterial,
-};
+use crate::material::{AlphaInput, ColorInput, Facets, Material, RangedInput, ScalarInput, TexturedMaterial};
 use crate::math::RenderSpace;
 use crate::medium::{Media, Medium, Subsurface};
 use crate::metal::{Metal, MetalNames};
@@ -71,7 +67,7 @@ impl MaterialTable {
         let default = Material::from(Lambert { albedo: Rgb::splat(0.5) });
         let mut table = Self { materials: vec![default], ..Self::default() };
         let media = NamedMedia::new(files, desc, used, faults);
-        let compiler = Compiler { files, textures: &textures, media: &media };
+        let compiler = Compiler { files, textures: &textures, media: &media, used };
         for name in desc.materials.keys() {
             let mut outer = Vec::new();
             let added = table.add(&compiler, desc, name, &mut outer);
@@ -205,6 +201,7 @@ pub(super) struct Compiler<'a> {
     pub(super) files: &'a CompileContext,
     pub(super) textures: &'a TextureTable,
     pub(super) media: &'a NamedMedia<'a>,
+    pub(super) used: &'a UsedNames,
 }
 
 impl Compiler<'_> {
@@ -261,6 +258,7 @@ impl Compiler<'_> {
                 return Err(files.error(path, "cannot be part of a material"));
             }
             MaterialDesc::Hair(desc) => self.hair(path, desc)?.into(),
+            MaterialDesc::Measured { file } => self.measured(path, file)?,
             MaterialDesc::Plastic(desc) => self.plastic(path, desc)?.into(),
             MaterialDesc::Principled(desc) => TexturedMaterial::Principled(self.principled(path, desc)?).into(),
         })
@@ -293,55 +291,6 @@ impl Compiler<'_> {
         })?;
         let [diffuse, specular] = self.sum_to_one(path, ["diffuse", "specular"], colors)?;
         Ok(TexturedMaterial::Phong { diffuse, specular, exponent, cosine: lobe == PhongLobeDesc::Cosine })
-    }
-
-    fn plastic(&self, path: &str, desc: &PlasticDesc) -> Result<TexturedMaterial> {
-        Ok(TexturedMaterial::Plastic {
-            coat: self.plastic_coat(path, desc)?,
-            albedo: self.color(&format!("{path}.albedo"), &desc.albedo)?,
-            tint: self.color(&format!("{path}.coat_tint"), &desc.coat_tint)?,
-            nonlinear: desc.nonlinear,
-        })
-    }
-
-    /// The coat of plastic, prepared where no texture changes it.
-    fn plastic_coat(&self, path: &str, desc: &PlasticDesc) -> Result<PlasticCoat> {
-        let ior = self.ranged(&format!("{path}.ior"), &desc.ior, |path, ior| {
-            let is_sound = ior > 1.0 && ior <= 10.0;
-            if is_sound {
-                Ok(())
-            } else {
-                Err(self.files.error(path, format!("must be above 1 and at most 10, not {ior}")))
-            }
-        })?;
-        let alpha = self.alpha(path, desc.roughness.as_ref(), desc.alpha.as_ref())?;
-        let facets = facets(desc.distribution, desc.multiscatter);
-        if facets == Facets::Ggx {
-            return Ok(PlasticCoat::Ggx(CoatInput::new(ior, alpha)));
-        }
-        let (RangedInput::Constant(ior), [ScalarInput::Constant(u), ScalarInput::Constant(v)]) = (ior, alpha.axes)
-        else {
-            let message = "with a `distribution` or without `multiscatter`, `ior`, `roughness` and `alpha` cannot come \
-                           from textures";
-            return Err(self.files.error(path, message));
-        };
-        if u != v {
-            let message =
-                "with a `distribution` or without `multiscatter`, the roughness must be the same along both axes";
-            return Err(self.files.error(path, message));
-        }
-        let alpha = [if alpha.squared { u * u } else { u }; 2];
-        Ok(match facets {
-            Facets::Ggx | Facets::SingleGgx => {
-                PlasticCoat::Ggx(CoatInput::Constant(Coat::single_scattering(ior, Ggx::new(alpha), diffuse_mean)))
-            }
-            Facets::SeparableGgx => {
-                PlasticCoat::SeparableGgx(Coat::single_scattering(ior, SeparableGgx::new(alpha), mitsuba_diffuse_mean))
-            }
-            Facets::Beckmann => {
-                PlasticCoat::Beckmann(Coat::single_scattering(ior, Beckmann::new(alpha), mitsuba_diffuse_mean))
-            }
-        })
     }
 
     /// Factors on what glass reflects and on what crosses it.
@@ -470,7 +419,12 @@ impl Compiler<'_> {
     }
 
     /// A number, or both ends of a texture's range, that pass `check`.
-    fn ranged(&self, path: &str, desc: &RangedDesc, check: impl Fn(&str, f32) -> Result<()>) -> Result<RangedInput> {
+    pub(super) fn ranged(
+        &self,
+        path: &str,
+        desc: &RangedDesc,
+        check: impl Fn(&str, f32) -> Result<()>,
+    ) -> Result<RangedInput> {
         Ok(match desc {
             RangedDesc::Constant(value) => {
                 check(path, *value)?;
@@ -490,7 +444,7 @@ impl Compiler<'_> {
     }
 }
 
-fn facets(distribution: DistributionDesc, multiscatter: bool) -> Facets {
+pub(super) fn facets(distribution: DistributionDesc, multiscatter: bool) -> Facets {
     match distribution {
         DistributionDesc::Beckmann => Facets::Beckmann,
         DistributionDesc::GgxSeparable => Facets::SeparableGgx,

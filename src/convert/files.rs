@@ -6,7 +6,7 @@ use std::io::{BufWriter, Cursor, Read, Write};
 use std::path::{Path, PathBuf};
 
 use super::{Originals, folder_of, write_ply};
-use crate::assets::{Assets, RgbImage, VDB_MAGICS, ies_bytes, vol_bytes};
+use crate::assets::{Assets, RgbImage, TENSOR_MAGIC, VDB_MAGICS, ies_bytes, vol_bytes};
 use crate::error::{Error, Result};
 use crate::file::{self, MARK, write_atomically};
 use crate::image_data::{ImageData, Samples};
@@ -244,6 +244,7 @@ fn check_kind(path: &Path, start: &[u8]) -> Result<()> {
         "PFM" => start.starts_with(b"PF") || start.starts_with(b"Pf"),
         "VOL" => start.starts_with(b"VOL"),
         "VDB" | "NVDB" => VDB_MAGICS.iter().any(|magic| start.starts_with(magic)),
+        "BSDF" => start.starts_with(TENSOR_MAGIC),
         "SERIALIZED" => start.starts_with(&[0x1c, 0x04]),
         // These have no mark, but a kind of image and a depth from a short list.
         "TGA" => {

@@ -1,6 +1,6 @@
 //! The files that a scene names.
 
-use super::{CurvesDesc, LightDesc, PointsDesc, SceneDesc, ShapeDesc, TextureDesc, VolumeDesc};
+use super::{CurvesDesc, LightDesc, MaterialDesc, PointsDesc, SceneDesc, ShapeDesc, TextureDesc, VolumeDesc};
 
 /// A file that a scene names.
 #[derive(Debug)]
@@ -47,6 +47,12 @@ impl SceneDesc {
                     name: file,
                     is_used: used.textures.contains(name),
                 });
+            }
+        }
+        for (name, material) in &mut self.materials {
+            if let MaterialDesc::Measured { file } = material {
+                let is_used = used.materials.contains(name);
+                files.push(NamedFile { path: format!("materials.{name}.file"), name: file, is_used });
             }
         }
         for (medium, desc) in &mut self.media {

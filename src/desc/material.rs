@@ -223,6 +223,12 @@ pub enum MaterialDesc {
     Principled(Box<PrincipledDesc>),
     /// Hair and fur, on `curves`.
     Hair(Box<HairDesc>),
+    /// Reflection as it was measured (Dupuy and Jakob, "An Adaptive Parameterization for Efficient Material Acquisition
+    /// and Rendering", 2018), the same on both sides. Parts are not told apart: layers of specular light have all of it.
+    Measured {
+        /// A file of the RGL material database or of the same format, with `rgb` or `spectra`.
+        file: String,
+    },
     /// Phong's model, by its parameters: a diffuse part beside a highlight.
     Phong {
         /// Diffuse reflectance, kd. Default: 0.5.

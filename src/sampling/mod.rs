@@ -1,6 +1,7 @@
-//! Random numbers, warps beside their densities, discrete and piecewise-constant distributions, weights that combine
-//! strategies.
+//! Random numbers, warps beside their densities, discrete, piecewise-constant and bilinear distributions, weights that
+//! combine strategies.
 
+mod bilinear;
 mod discrete;
 mod mis;
 mod piecewise;
@@ -10,6 +11,7 @@ mod sampler;
 pub mod statistics;
 pub mod warp;
 
+pub use bilinear::{BilinearTable, BilinearWarp, SliceMix};
 pub use discrete::{AliasTable, DiscreteSample};
 pub use mis::power_heuristic;
 pub use piecewise::{Piecewise2d, PiecewiseCell, PiecewiseSample};

@@ -6,6 +6,7 @@ mod diffuse;
 mod energy;
 mod hair;
 mod limits;
+mod measured;
 mod microfacet;
 mod phase;
 mod principled;

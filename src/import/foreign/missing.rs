@@ -5,14 +5,16 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::{Imported, Outcome, ReportEntry};
-use crate::desc::{LightDesc, MeshDesc, ShapeDesc, TextureDesc};
+use crate::desc::{
+    ColorDesc, LightDesc, MaterialDesc, MediumDesc, MeshDesc, ScalarDesc, ShapeDesc, TextureDesc, VolumeDesc,
+};
 
 /// The replacement of an image that does not exist.
 const GREY: [f32; 3] = [0.5; 3];
 
 impl Imported {
-    /// Takes out what refers to files that are not there: meshes, measured lights and environments go, images become
-    /// grey. Each is reported as ignored. `scene` is the scene's file. The result is how many there were.
+    /// Takes out what refers to files that are not there: meshes, measured lights and environments go, images and
+    /// measured materials become grey, media whose volumes are missing are empty. Each is reported as ignored. `scene` is the scene's file. The result is how many there were.
     pub fn leave_out_missing(&mut self, scene: &Path) -> usize {
         let folder = scene.parent().unwrap_or(Path::new("")).to_owned();
         let assets = &self.assets;
@@ -58,6 +60,32 @@ impl Imported {
                 let path = format!("textures.{name}");
                 report(places.get(&path).unwrap_or(&path), "texture image", file);
                 *texture = TextureDesc::Constant { color: GREY };
+            }
+        }
+        for (name, material) in &mut self.desc.materials {
+            if let MaterialDesc::Measured { file } = material
+                && is_missing(file)
+            {
+                let path = format!("materials.{name}");
+                report(places.get(&path).unwrap_or(&path), "material measured", file);
+                let [grey, ..] = GREY;
+                *material =
+                    MaterialDesc::Diffuse { albedo: ColorDesc::Grey(grey), roughness: ScalarDesc::Constant(0.0) };
+            }
+        }
+        for (name, medium) in &mut self.desc.media {
+            let parts = medium.volume.iter_mut().flat_map(|volume| volume.parts_mut());
+            let missing = parts.filter_map(|(key, part)| match part {
+                VolumeDesc::Grid { file: Some(file), .. } if is_missing(file) => Some((key, file.clone())),
+                _ => None,
+            });
+            let missing: Vec<_> = missing.collect();
+            for (key, file) in &missing {
+                let path = format!("media.{name}");
+                report(places.get(&path).unwrap_or(&path), &format!("medium volume {key}"), file);
+            }
+            if !missing.is_empty() {
+                *medium = MediumDesc::default();
             }
         }
         // Objects that have nothing left take their instances with them.
@@ -111,14 +139,25 @@ mod tests {
             "shapes": [{ "type": "mesh", "file": "no.ply" }, { "type": "mesh", "file": "here.ply" },
             { "type": "sphere" }],
             "objects": { "o": { "shapes": [{ "type": "mesh", "file": "no.obj" }] } }, "instances": [{ "object": "o" }],
+            "materials": { "a": { "type": "measured", "file": "no.bsdf" }, "b": { "type": "measured", "file": "here.ply" } },
+            "media": { "m": { "scattering": 1, "volume": { "density": { "type": "grid", "file": "no.vdb" },
+            "albedo": { "type": "grid", "file": "no.raw", "resolution": [1, 1, 1] } } },
+            "n": { "scattering": 1, "volume": { "density": { "type": "grid", "file": "here.ply" } } } },
             "lights": [{ "type": "environment", "file": "no.exr" },
             { "type": "environment", "radiance": [1, 1, 1] }] }"#;
         std::fs::write(&path, scene).unwrap();
         let mut imported = read_scene(&path, &ImportOptions::default()).unwrap();
-        assert_eq!(imported.leave_out_missing(&path), 4);
+        assert_eq!(imported.leave_out_missing(&path), 7);
         assert_eq!((imported.desc.shapes.len(), imported.desc.lights.len(), imported.desc.instances.len()), (2, 1, 0));
         assert!(matches!(imported.desc.textures["t"], TextureDesc::Constant { color: GREY }));
-        assert_eq!(imported.report.count(Outcome::Ignored), 4);
+        assert_eq!(imported.report.count(Outcome::Ignored), 7);
+        assert!(matches!(imported.desc.materials["a"], MaterialDesc::Diffuse { .. }));
+        assert!(matches!(imported.desc.materials["b"], MaterialDesc::Measured { .. }));
+        assert!(imported.desc.media["m"].volume.is_none() && imported.desc.media["n"].volume.is_some());
+        assert_eq!(imported.desc.media["m"].scattering.to_array(), [0.0; 3]);
+        let notes: Vec<_> = imported.report.entries.iter().map(|entry| (&*entry.element, &*entry.note)).collect();
+        assert!(notes.contains(&("medium volume density", "no file no.vdb")), "{notes:?}");
+        assert!(notes.contains(&("medium volume albedo", "no file no.raw")), "{notes:?}");
         assert_eq!(imported.leave_out_missing(&path), 0);
     }
 

@@ -27,7 +27,8 @@ pub struct ImportArgs {
     /// Fail with exit code 3 if anything of the file was approximated or ignored
     #[arg(long, help_heading = "Import")]
     pub strict: bool,
-    /// Render without missing files: meshes and lights are left out, images are grey
+    /// Render without missing files: meshes and lights are left out, images and measured materials are grey, media are
+    /// empty
     #[arg(long, help_heading = "Import")]
     pub allow_missing: bool,
 }

@@ -168,6 +168,11 @@ impl<'a> Reader<'a> {
             }
             "principled" => self.principled(element, uv)?,
             "hair" => (self.hair(element, uv)?, false),
+            "measured" => {
+                let file = element.file("filename", self.scene)?;
+                let file = file.ok_or_else(|| element.place().error("a measured bsdf needs \"filename\""))?;
+                (MaterialDesc::Measured { file }, true)
+            }
             _ => {
                 element.ignored("", "unsupported BSDF: a grey diffuse surface in its place");
                 (MaterialDesc::Diffuse { albedo: ColorDesc::Grey(0.5), roughness: ScalarDesc::Constant(0.0) }, true)

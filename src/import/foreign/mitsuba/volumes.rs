@@ -4,7 +4,7 @@ use super::Reader;
 use super::element::Element;
 use super::shapes::steps;
 use super::tree::PluginId;
-use crate::assets::{VolHeader, read_vol_header};
+use crate::assets::{AssetError, VolHeader, read_vol_header};
 use crate::desc::{BorderDesc, MediumVolumeDesc, VolumeDesc};
 use crate::error::Result;
 use crate::math::{DAffine3, DMat3, DVec3};
@@ -68,8 +68,13 @@ impl<'a> Reader<'a> {
         let file = volume.file("filename", self.scene)?;
         let file = file.ok_or_else(|| volume.place().error("a gridvolume needs \"filename\""))?;
         let path = self.scene.parent().unwrap_or(std::path::Path::new("")).join(&file);
-        let VolHeader { channels, bounds, .. } =
-            read_vol_header(&path).map_err(|e| e.at(self.scene, &volume.place_of("filename").to_string(), &path))?;
+        let VolHeader { channels, bounds, .. } = match read_vol_header(&path) {
+            // An error when the scene is compiled, unless the medium is left out.
+            Err(AssetError::Missing { .. }) => {
+                VolHeader { resolution: [1; 3], channels: 1, bounds: [[0.0; 3], [1.0; 3]] }
+            }
+            header => header.map_err(|e| e.at(self.scene, &volume.place_of("filename").to_string(), &path))?,
+        };
         let mut map = volume.transform("to_world")?;
         if volume.boolean("use_grid_bbox", false)? {
             let [min, max] = bounds.map(|corner| DVec3::from(corner.map(f64::from)));

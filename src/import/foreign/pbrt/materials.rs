@@ -71,9 +71,8 @@ impl Materials<'_> {
             "subsurface" => self.subsurface(params)?,
             "hair" => self.hair(params)?,
             "measured" => {
-                params.ignore("filename", "measured materials are not known");
-                self.draft.approximated(&params.place, &params.element, "", "diffuse of 0.5");
-                MaterialDesc::Diffuse { albedo: ColorDesc::Grey(0.5), roughness: zero() }
+                let file = params.string("filename")?.ok_or_else(|| params.error("needs a filename"))?;
+                MaterialDesc::Measured { file: file.to_owned() }
             }
             other => return Err(params.error(format!("unknown material \"{other}\""))),
         })

@@ -57,12 +57,15 @@ impl MediumDirective<'_> {
         let path = self.colors.folder.join(file);
         let place = format!("{}: {}", params.place, params.element);
         let error = |error: AssetError| error.at(self.scene, &place, &path);
-        let has_temperature = list_vdb(&path).map_err(error)?.iter().any(|(name, _)| name == "temperature");
-        let emission = if has_temperature {
+        let (grids, why) = match list_vdb(&path) {
+            // An error when the scene is compiled, unless the medium is left out.
+            Err(AssetError::Missing { .. }) => (Vec::new(), "the file is not there"),
+            listed => (listed.map_err(error)?, "the file has no grid named \"temperature\""),
+        };
+        let emission = if grids.iter().any(|(name, _)| name == "temperature") {
             let read = |name| read_vdb(&path, GridChoice { name: Some(name), default: name }).map_err(error);
             self.blackbody_emission(draft, &read("density")?, &read("temperature")?)?
         } else {
-            let why = "the file has no grid named \"temperature\"";
             for name in ["Lescale", "temperaturescale", "temperatureoffset", "temperaturecutoff"] {
                 params.ignore(name, why);
             }

@@ -382,3 +382,11 @@ fn skies_are_turned_with_their_transform() {
     let d = turn * DVec3::new(d[0], 0.0, d[1]);
     assert!((d - DVec3::new(1.0, 1.0, 0.0)).length() < 1e-9, "{d}");
 }
+
+#[test]
+fn measured_materials_are_those_of_their_files() {
+    let found = material("WorldBegin Material \"measured\" \"string filename\" \"coin.bsdf\"");
+    assert!(matches!(&found, MaterialDesc::Measured { file } if file == "coin.bsdf"), "{found:?}");
+    let error = read_with("WorldBegin Material \"measured\" Shape \"sphere\"", &[]).err().unwrap().to_string();
+    assert!(error.contains("needs a filename"), "{error}");
+}
