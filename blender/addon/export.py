@@ -10,6 +10,7 @@ from . import camera, hair, lights, meshes, transforms, world
 from .images import Images
 from .materials import Materials
 from .report import Report
+from .volumes import Volumes
 
 SURFACES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 
@@ -44,6 +45,7 @@ class Export:
         self._depsgraph, self._folder, self._frames = depsgraph, Path(folder), frames
         self._images = Images(folder, self.report)
         self._materials = Materials(self._images, self.report)
+        self._volumes = Volumes(self.report)
         self._geometries, self._lights, self._lamps = {}, [], []
 
     def scene(self, view_camera=None):
@@ -60,10 +62,11 @@ class Export:
         found = {
             "camera": view_camera or self._camera(evaluated),
             "film": self._film(evaluated),
-            "materials": self._materials.materials,
+            "materials": {**self._materials.materials, **self._volumes.materials},
+            "media": self._volumes.media,
             "textures": self._materials.textures,
             "lights": self._lights + ([background] if background else []),
-            "shapes": list(self._lamps),
+            "shapes": self._lamps + self._volumes.shapes,
             "objects": {},
             "instances": [],
         }
@@ -95,10 +98,11 @@ class Export:
             self._lamps += shapes
         elif instance.show_self and (owner.type in SURFACES or owner.type == "CURVES"):
             geometry = self._geometry(owner)
-            name = instance.parent.name if instance.is_instance and instance.parent else owner.name
             if geometry is not None:
-                geometry.placements.append(Placement(name, instance.matrix_world.copy()))
-        elif owner.type in ("VOLUME", "POINTCLOUD", "GREASEPENCIL"):
+                geometry.placements.append(Placement(_name(instance), instance.matrix_world.copy()))
+        elif owner.type == "VOLUME" and instance.show_self:
+            self._volumes.add(owner, instance.matrix_world.copy(), _name(instance))
+        elif owner.type in ("POINTCLOUD", "GREASEPENCIL"):
             self.report.warn(f"object {owner.name}", f"objects of type {owner.type} are left out")
         if instance.show_particles and any(s.settings.type == "HAIR" for s in owner.particle_systems):
             self.report.warn(f"object {owner.name}", "particle hair is left out; convert it to curves")
@@ -161,7 +165,7 @@ class Export:
                 placement.motion = placement.motion if moves and len(placement.motion) == 3 else []
 
     def _move(self, owner, instance, seen):
-        name = instance.parent.name if instance.is_instance and instance.parent else owner.name
+        name = _name(instance)
         for geometry in self._geometries.values():
             if geometry.name != owner.name:
                 continue
@@ -184,6 +188,11 @@ class Export:
         found["objects"][name] = {"shapes": [{**shape, "name": geometry.name} for shape in geometry.shapes]}
         for placement in geometry.placements:
             found["instances"].append({"object": name, "name": placement.name, **_where(placement)})
+
+
+def _name(instance):
+    """The name of an object, or of what it is an instance by."""
+    return instance.parent.name if instance.is_instance and instance.parent else instance.object.name
 
 
 def _where(placement):

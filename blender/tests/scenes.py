@@ -24,6 +24,7 @@ def reset():
         bpy.data.worlds,
         bpy.data.curves,
         bpy.data.hair_curves,
+        bpy.data.volumes,
     ):
         for block in list(collection):
             collection.remove(block)
@@ -36,8 +37,8 @@ def reset():
     scene.view_settings.view_transform = "Raw"
     scene.cycles.device = "CPU"
     scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
-    for name in ("max_bounces", "diffuse_bounces", "glossy_bounces", "transmission_bounces", "transparent_max_bounces"):
-        setattr(scene.cycles, name, 64)
+    for kind in ("max", "diffuse", "glossy", "transmission", "volume", "transparent_max"):
+        setattr(scene.cycles, f"{kind}_bounces", 64)
     scene.cycles.blur_glossy = 0
     scene.cycles.sample_clamp_indirect = 0
     for name in (
@@ -127,6 +128,24 @@ def fill(node, **values):
 def diffuse(color, name="material"):
     """A diffuse material."""
     return shader("ShaderNodeBsdfDiffuse", name, Color=color)[0]
+
+
+def smoke(material, file="fire", location=(0, 0, 0)):
+    """A volume object of a file of the tests, about 5 units wide around (-5, -8, -2.5)."""
+    data = bpy.data.volumes.new("smoke")
+    data.filepath = str(Path(__file__).parents[2] / f"tests/regressions/vdb/{file}.vdb")
+    data.materials.append(material)
+    return link(data, "smoke", location)
+
+
+def volume(kind, name="material", **values):
+    """A material of one volume shader: (material, node)."""
+    material, node = shader(kind, name, **values)
+    tree = material.node_tree
+    output = tree.get_output_node("ALL")
+    tree.links.remove(output.inputs["Surface"].links[0])
+    tree.links.new(node.outputs[0], output.inputs["Volume"])
+    return material, node
 
 
 def box(size, location=(0, 0, 0), material=None, inside=False, name="box"):

@@ -116,6 +116,61 @@ def test_what_has_no_counterpart_is_named_once(tmp_path):
     assert sorted(warnings) == sorted(expected)
 
 
+def test_volumes_are_boxes_with_media(tmp_path):
+    values = {"Color": (0.8, 0.6, 0.2), "Density": 3.0, "Anisotropy": 0.25, "Absorption_Color": (0.25, 0.0, 0.0)}
+    heat = {"Blackbody_Intensity": 0.5, "Temperature": 1500.0}
+    material, _ = scenes.volume("ShaderNodeVolumePrincipled", **values, **heat)
+    found = scenes.smoke(material, location=(1, 2, 3))
+    found.scale = (2, 2, 2)
+    scenes.camera((0, -5, 2), (0, 0, 0))
+    scene, warnings = export(tmp_path)
+    assert not warnings
+    medium = scene["media"]["smoke"]
+    # Twice the size, half the density; what is not scattered is absorbed, times 1 - sqrt(0.25) of red.
+    assert medium["scattering"] == pytest.approx([1.2, 0.9, 0.3])
+    assert medium["absorption"] == pytest.approx([0.2 * 0.5 * 1.5, 0.4 * 1.5, 0.8 * 1.5])
+    assert medium["emission"] == pytest.approx([0.25] * 3)
+    assert medium["phase"] == {"type": "henyey_greenstein", "g": pytest.approx(0.25)}
+    volume = medium["volume"]
+    assert {key: volume[key]["grid"] for key in ("scattering", "absorption", "temperature")} == {
+        "scattering": "density",
+        "absorption": "density",
+        "temperature": "temperature",
+    }
+    assert volume["scattering"]["file"].endswith("fire.vdb") and volume["temperature_scale"] == 1500
+    assert volume["transform"]["matrix"][0] == pytest.approx([2, 0, 0, 1])
+    (shape,) = scene["shapes"]
+    assert shape["type"] == "cube" and shape["name"] == "smoke"
+    assert scene["materials"][shape["material"]] == {"type": "dielectric", "ior": 1, "medium": "smoke"}
+    corner = [t.get("translate") for t in shape["transform"]][1]
+    low, high = (np.array(found.bound_box).min(axis=0), np.array(found.bound_box).max(axis=0))
+    assert corner == pytest.approx(list((low + high) / 2)) and shape["transform"][0]["scale"] == pytest.approx(
+        list((high - low) / 2)
+    )
+
+
+def test_other_volume_shaders_and_what_they_lack(tmp_path):
+    scatter, node = scenes.volume("ShaderNodeVolumeScatter", "scatter", Color=(0.5, 0.5, 0.5))
+    info, half = (scatter.node_tree.nodes.new(kind) for kind in ("ShaderNodeVolumeInfo", "ShaderNodeMath"))
+    half.operation, half.inputs[1].default_value = "MULTIPLY", 4.0
+    scatter.node_tree.links.new(info.outputs["Density"], half.inputs[0])
+    scatter.node_tree.links.new(half.outputs[0], node.inputs["Density"])
+    absorb, _ = scenes.volume("ShaderNodeVolumeAbsorption", "absorb", Color=(0.75, 0.5, 1.0), Density=2.0)
+    first, second = scenes.smoke(scatter), scenes.smoke(absorb)
+    scenes.smoke(scenes.diffuse((1, 1, 1)))
+    gone = scenes.smoke(scatter)
+    gone.data.filepath = "/nowhere/gone.vdb"
+    scenes.camera((0, -5, 2), (0, 0, 0))
+    scene, warnings = export(tmp_path)
+    grid = scene["media"][first.name]["volume"]["scattering"]
+    assert scene["media"][first.name]["scattering"] == [2.0] * 3 and grid["grid"] == "density"
+    assert scene["media"][second.name]["absorption"] == [0.5, 1.0, 0.0] and len(scene["media"]) == 2
+    assert "volume" not in scene["media"][second.name]
+    assert len(warnings) == 2
+    assert "it has no volume shader and is left out" in warnings[0]
+    assert "its volume cannot be read and is left out" in warnings[1]
+
+
 def test_constants_are_computed(tmp_path):
     material, node = scenes.shader("ShaderNodeBsdfDiffuse")
     tree = material.node_tree

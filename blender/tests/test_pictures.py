@@ -390,3 +390,17 @@ def test_hair():
     bpy.context.scene.cycles_curves.shape = "THICK"
     scenes.camera((0, -4, 1), (0, 0, 0.5))
     agree(steradian=32, cycles=64)
+
+
+@pytest.mark.parametrize("size", [1, 2])
+def test_smoke(size):
+    small()
+    values = {"Color": (0.8, 0.6, 0.2), "Density": 3.0, "Absorption_Color": (0.25, 0.0, 0.0), "Anisotropy": 0.5}
+    found = scenes.smoke(scenes.volume("ShaderNodeVolumePrincipled", **values)[0])
+    found.scale = (size, size, size)
+    bpy.context.view_layer.update()
+    middle = size * np.array(found.bound_box).mean(axis=0)
+    scenes.lamp("SUN", (0, 0, 9), (3, 2, 0), energy=3)
+    scenes.sky(1)
+    scenes.camera(middle + size * np.array((0, -14, 4)), middle, lens=45)
+    agree()
