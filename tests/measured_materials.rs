@@ -1,4 +1,4 @@
-//! Measured materials: files of `tools/measured_files.py` beside what Mitsuba makes of them, what is refused, conversion.
+//! Measured materials: files of `tools/measured_files.py` beside what Mitsuba makes of them, what is refused, copies.
 
 use serde_json::{Value, json};
 use steradian::ErrorKind;
@@ -225,7 +225,8 @@ fn scenes_have_measured_materials() {
 fn white_light_from_everywhere_is_what_the_tables_reflect() {
     let folder = folder_with("isotropic.bsdf");
     let scene = json!({
-        "film": { "width": 24, "height": 24 }, "camera": { "position": [0, 0, 9], "look_at": [0, 0, 0], "vertical_fov_degrees": 1 },
+        "film": { "width": 24, "height": 24 },
+        "camera": { "position": [0, 0, 9], "look_at": [0, 0, 0], "vertical_fov_degrees": 1 },
         "sampler": { "spp": 64 }, "lights": [{ "type": "environment", "radiance": [1, 1, 1] }],
         "materials": { "m": { "type": "measured", "file": "isotropic.bsdf" } },
         "shapes": [{ "type": "sphere", "material": "m" }]

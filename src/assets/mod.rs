@@ -1,5 +1,5 @@
-//! Assets, which a scene names: meshes, images, volumes, light profiles and measured BRDFs, read from files to buffers that nobody has
-//! checked, or made by the reader of a scene format.
+//! Assets, which a scene names: meshes, images, volumes, light profiles and measured BRDFs, read from files to buffers
+//! that nobody has checked, or made by the reader of a scene format.
 
 mod environment_image;
 mod fingerprint;

@@ -32,8 +32,8 @@ const MAX_COLOR: f32 = 1e6;
 const ANGLE_TOLERANCE: f32 = 1e-3;
 
 /// Reads a measured BRDF: a file of `tensor_file`, a zero byte and the version 1.0 with the fields `phi_i`, `theta_i`,
-/// `ndf`, `sigma`, `vndf`, `luminance`, `jacobian`, and either `rgb` or `spectra` and `wavelengths` in nanometres, which
-/// become the colours of what reflects under D65.
+/// `ndf`, `sigma`, `vndf`, `luminance`, `jacobian`, and either `rgb` or `spectra` and `wavelengths` in nanometres,
+/// which become the colours of what reflects under D65.
 ///
 /// # Errors
 /// [`AssetError`] if the file cannot be read, is no such file, or its fields do not fit each other.

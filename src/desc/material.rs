@@ -224,7 +224,8 @@ pub enum MaterialDesc {
     /// Hair and fur, on `curves`.
     Hair(Box<HairDesc>),
     /// Reflection as it was measured (Dupuy and Jakob, "An Adaptive Parameterization for Efficient Material Acquisition
-    /// and Rendering", 2018), the same on both sides. Parts are not told apart: layers of specular light have all of it.
+    /// and Rendering", 2018), the same on both sides. Diffuse and specular parts are not separate: layers of specular
+    /// light have all of it.
     Measured {
         /// A file of the RGL material database or of the same format, with `rgb` or `spectra`.
         file: String,

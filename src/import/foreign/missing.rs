@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::{Imported, Outcome, ReportEntry};
 use crate::desc::{
-    ColorDesc, LightDesc, MaterialDesc, MediumDesc, MeshDesc, ScalarDesc, ShapeDesc, TextureDesc, VolumeDesc,
+    ColorDesc, LightDesc, MaterialDesc, MediumDesc, MeshDesc, ScalarDesc, SceneDesc, ShapeDesc, TextureDesc, VolumeDesc,
 };
 
 /// The replacement of an image that does not exist.
@@ -14,7 +14,8 @@ const GREY: [f32; 3] = [0.5; 3];
 
 impl Imported {
     /// Takes out what refers to files that are not there: meshes, measured lights and environments go, images and
-    /// measured materials become grey, media whose volumes are missing are empty. Each is reported as ignored. `scene` is the scene's file. The result is how many there were.
+    /// measured materials become grey, media are empty. Each is reported as ignored. `scene` is the scene's file. The
+    /// result is how many there were.
     pub fn leave_out_missing(&mut self, scene: &Path) -> usize {
         let folder = scene.parent().unwrap_or(Path::new("")).to_owned();
         let assets = &self.assets;
@@ -53,41 +54,9 @@ impl Imported {
             };
             file.filter(|file| is_missing(file)).inspect(|file| report(place, "light", file)).is_none()
         });
-        for (name, texture) in &mut self.desc.textures {
-            if let TextureDesc::Image { file, .. } = texture
-                && is_missing(file)
-            {
-                let path = format!("textures.{name}");
-                report(places.get(&path).unwrap_or(&path), "texture image", file);
-                *texture = TextureDesc::Constant { color: GREY };
-            }
-        }
-        for (name, material) in &mut self.desc.materials {
-            if let MaterialDesc::Measured { file } = material
-                && is_missing(file)
-            {
-                let path = format!("materials.{name}");
-                report(places.get(&path).unwrap_or(&path), "material measured", file);
-                let [grey, ..] = GREY;
-                *material =
-                    MaterialDesc::Diffuse { albedo: ColorDesc::Grey(grey), roughness: ScalarDesc::Constant(0.0) };
-            }
-        }
-        for (name, medium) in &mut self.desc.media {
-            let parts = medium.volume.iter_mut().flat_map(|volume| volume.parts_mut());
-            let missing = parts.filter_map(|(key, part)| match part {
-                VolumeDesc::Grid { file: Some(file), .. } if is_missing(file) => Some((key, file.clone())),
-                _ => None,
-            });
-            let missing: Vec<_> = missing.collect();
-            for (key, file) in &missing {
-                let path = format!("media.{name}");
-                report(places.get(&path).unwrap_or(&path), &format!("medium volume {key}"), file);
-            }
-            if !missing.is_empty() {
-                *medium = MediumDesc::default();
-            }
-        }
+        leave_out_contents(&mut self.desc, &is_missing, |path, element, file| {
+            report(places.get(path).map_or(path, String::as_str), element, file);
+        });
         // Objects that have nothing left take their instances with them.
         let objects = &self.desc.objects;
         let is_empty = |name: &str| {
@@ -95,6 +64,44 @@ impl Imported {
         };
         retain("instances", &mut self.desc.instances, places, |_, instance| !is_empty(&instance.object));
         self.report.entries.len() - before
+    }
+}
+
+/// Makes images and measured materials grey and media empty whose files are missing. Each is reported with its path.
+fn leave_out_contents(
+    desc: &mut SceneDesc,
+    is_missing: &impl Fn(&str) -> bool,
+    mut report: impl FnMut(&str, &str, &str),
+) {
+    for (name, texture) in &mut desc.textures {
+        if let TextureDesc::Image { file, .. } = texture
+            && is_missing(file)
+        {
+            report(&format!("textures.{name}"), "texture image", file);
+            *texture = TextureDesc::Constant { color: GREY };
+        }
+    }
+    for (name, material) in &mut desc.materials {
+        if let MaterialDesc::Measured { file } = material
+            && is_missing(file)
+        {
+            report(&format!("materials.{name}"), "material measured", file);
+            *material = MaterialDesc::Diffuse { albedo: ColorDesc::Rgb(GREY), roughness: ScalarDesc::Constant(0.0) };
+        }
+    }
+    for (name, medium) in &mut desc.media {
+        let mut is_whole = true;
+        for (key, part) in medium.volume.iter_mut().flat_map(|volume| volume.parts_mut()) {
+            if let VolumeDesc::Grid { file: Some(file), .. } = part
+                && is_missing(file)
+            {
+                report(&format!("media.{name}"), &format!("medium volume {key}"), file);
+                is_whole = false;
+            }
+        }
+        if !is_whole {
+            *medium = MediumDesc::default();
+        }
     }
 }
 
@@ -139,7 +146,8 @@ mod tests {
             "shapes": [{ "type": "mesh", "file": "no.ply" }, { "type": "mesh", "file": "here.ply" },
             { "type": "sphere" }],
             "objects": { "o": { "shapes": [{ "type": "mesh", "file": "no.obj" }] } }, "instances": [{ "object": "o" }],
-            "materials": { "a": { "type": "measured", "file": "no.bsdf" }, "b": { "type": "measured", "file": "here.ply" } },
+            "materials": { "a": { "type": "measured", "file": "no.bsdf" },
+            "b": { "type": "measured", "file": "here.ply" } },
             "media": { "m": { "scattering": 1, "volume": { "density": { "type": "grid", "file": "no.vdb" },
             "albedo": { "type": "grid", "file": "no.raw", "resolution": [1, 1, 1] } } },
             "n": { "scattering": 1, "volume": { "density": { "type": "grid", "file": "here.ply" } } } },
