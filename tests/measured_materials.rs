@@ -212,9 +212,9 @@ fn scenes_have_measured_materials() {
     let folder = folder_with("mirrors.bsdf");
     let anisotropic = folder.compile(&scene("mirrors.bsdf")).unwrap();
     assert!(anisotropic.features.anisotropic);
-    assert_error(&folder, &scene("gone.bsdf"), ErrorKind::Missing, &["gone.bsdf", "materials.coin.file"]);
+    assert_error(&folder, &scene("gone.bsdf"), ErrorKind::AssetMissing, &["gone.bsdf", "materials.coin.file"]);
     folder.write("bad.bsdf", "tensor_file\0\u{1}");
-    assert_error(&folder, &scene("bad.bsdf"), ErrorKind::Input, &["bad.bsdf", "materials.coin.file", "header"]);
+    assert_error(&folder, &scene("bad.bsdf"), ErrorKind::Scene, &["bad.bsdf", "materials.coin.file", "header"]);
     // What nothing uses is not read.
     let mut unused = good_scene();
     set(&mut unused, "materials.coin", json!({ "type": "measured", "file": "gone.bsdf" }));
