@@ -8,7 +8,7 @@ use steradian::desc::GuidingDesc;
 use steradian::internal::accel::{self, AccelKind};
 use steradian::internal::film::Image;
 use steradian::internal::math::Rng;
-use steradian::internal::render::{self, Overrides, Shard, StateFile};
+use steradian::internal::render::{self, Overrides, RenderState, Shard, StateFile};
 
 use crate::checkpoints::{Kit, StopAfter, bits};
 use crate::guiding::room_with_shaft;
@@ -95,6 +95,29 @@ fn a_resumed_render_has_the_bits_of_one_run() {
         assert!(stops.iter().any(|&done| done < 4) && stops.iter().any(|&done| done > 4), "{stops:?}");
         assert!(bits(&state.whole_film()) == bits(&reference.whole_film()));
         assert_eq!(state.rays, reference.rays);
+    }
+}
+
+/// A state whose stage of guiding its settings rule out.
+#[test]
+fn states_that_are_guided_against_their_settings_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.state");
+    let kits = [GuidingDesc::Off, GuidingDesc::Auto, GuidingDesc::On].map(|guiding| kit(&hard(), guiding, SPP));
+    let refusal = |written: &Kit, settings: &Kit| {
+        let header = settings.header(Shard::WHOLE);
+        written.start(Shard::WHOLE).write(&header, std::fs::File::create(&path).unwrap()).unwrap();
+        let Kit { prepared, .. } = settings;
+        RenderState::read(&path, &header, &prepared.scene, &prepared.settings).err().map(|error| error.to_string())
+    };
+    let [off, auto, on] = &kits;
+    // A pilot may have found that paths are to be guided, or not.
+    for (written, settings) in [(off, off), (auto, auto), (on, on), (off, auto), (on, auto)] {
+        assert_eq!(refusal(written, settings), None);
+    }
+    for (written, settings) in [(auto, off), (on, off), (off, on), (auto, on)] {
+        let error = refusal(written, settings).unwrap();
+        assert!(error.contains("a.state") && error.contains("does not fit its settings"), "{error}");
     }
 }
 

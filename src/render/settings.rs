@@ -7,7 +7,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::integrator_overrides::integrator;
-use super::{ExrOverrides, Overrides, Shard, TrainedGuide};
+use super::{ExrOverrides, GuidingStage, Overrides, Shard, TrainedGuide};
 use crate::accel::AccelKind;
 use crate::desc::{
     CausticsDesc, FilterDesc, GuidingDesc, IntegratorDesc, LayerKind, MAX_SIDE, OutputDesc, PixelTypeDesc, SceneDesc,
@@ -148,16 +148,29 @@ impl Settings {
 
     /// Whether a pilot decides if paths are guided.
     pub fn has_guiding_pilot(&self) -> bool {
+        let samples = self.crop.area() * u64::from(self.spp);
+        self.allows_guiding_pilot() && self.spp >= LEAST_GUIDED_SPP && samples >= LEAST_GUIDED_SAMPLES
+    }
+
+    /// Whether a pilot decides where there are enough samples.
+    fn allows_guiding_pilot(&self) -> bool {
         let IntegratorDesc::Path { guiding: GuidingDesc::Auto, strategy, max_depth, .. } = self.integrator else {
             return false;
         };
-        let samples = self.crop.area() * u64::from(self.spp);
-        let can_be_guided = self.guide.is_none() && self.target_error.is_none() && !self.gathers_photons();
-        can_be_guided
+        self.guide.is_none()
+            && self.target_error.is_none()
+            && !self.gathers_photons()
             && strategy == StrategyDesc::Mis
             && max_depth >= LEAST_GUIDED_DEPTH
-            && self.spp >= LEAST_GUIDED_SPP
-            && samples >= LEAST_GUIDED_SAMPLES
+    }
+
+    /// Whether a state with these settings can be at this stage, with any number of samples: more may have been added.
+    pub(super) fn allows_stage(&self, stage: GuidingStage) -> bool {
+        match stage {
+            GuidingStage::Off => !self.is_guided(),
+            GuidingStage::Pilot => self.allows_guiding_pilot(),
+            GuidingStage::On => self.is_guided() || self.allows_guiding_pilot(),
+        }
     }
 
     /// The view of the first PNG file; without one, that which suits the integrator.

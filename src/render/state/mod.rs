@@ -99,7 +99,11 @@ impl RenderState {
         if reader.header().film != *film.shape() {
             return Err(reader.fault("the film has other layers"));
         }
-        let planner = match reader.header().guiding {
+        let stage = reader.header().guiding;
+        if !settings.allows_stage(stage) {
+            return Err(reader.fault("whether its paths are guided does not fit its settings"));
+        }
+        let planner = match stage {
             GuidingStage::Off if settings.target_error.is_none() => Planner::Uniform,
             GuidingStage::Off => Planner::new(settings, &film, header.shard)?,
             stage => Planner::guided(stage, &film)?,
