@@ -158,7 +158,7 @@ impl Tables {
         let o = wo * flip;
         let phi = azimuth(o);
         let azimuth = if self.symmetry == Symmetry::Isotropic { phi } else { 0.0 };
-        View { o, flip, azimuth, mix: SliceMix::between((&self.phi, phi), (&self.theta, elevation(o))) }
+        View { o, flip, azimuth, mix: SliceMix::between([&self.phi, &self.theta], [phi, elevation(o)]) }
     }
 
     fn eval(&self, view: &View, wi: Vec3) -> BsdfEval {

@@ -13,13 +13,13 @@ impl SliceMix {
     /// The first slice alone.
     pub const FIRST: Self = Self([(0, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)]);
 
-    /// Interpolates along two axes: slices are at every pair of knots of `outer` and of `inner`, which both increase,
-    /// those of `inner` next to each other. Outside of the knots, the outermost ones count.
-    pub fn between(outer: (&[f32], f32), inner: (&[f32], f32)) -> Self {
-        let ((row, y), (column, x)) = (bracket(outer.0, outer.1), bracket(inner.0, inner.1));
+    /// Interpolates at `place` along two axes: slices are at every pair of knots of the outer and of the inner one,
+    /// which both increase, those of the inner one next to each other. Outside of the knots, the outermost ones count.
+    pub fn between([outer, inner]: [&[f32]; 2], place: [f32; 2]) -> Self {
+        let ((row, y), (column, x)) = (bracket(outer, place[0]), bracket(inner, place[1]));
         let slice = |dy: usize, dx: usize| {
             let knot = |at: usize, d: usize, count: usize| (at + d).min(count - 1);
-            knot(row, dy, outer.0.len()) * inner.0.len() + knot(column, dx, inner.0.len())
+            knot(row, dy, outer.len()) * inner.len() + knot(column, dx, inner.len())
         };
         Self([
             (slice(0, 0), (1.0 - y) * (1.0 - x)),
@@ -260,7 +260,7 @@ mod tests {
     const KNOTS: [f32; 2] = [0.5, 1.5];
 
     fn mixes() -> [SliceMix; 4] {
-        [-9.0, 0.75, 1.25, 9.0].map(|x| SliceMix::between((&[0.0], 7.0), (&KNOTS, x)))
+        [-9.0, 0.75, 1.25, 9.0].map(|x| SliceMix::between([&[0.0], &KNOTS], [7.0, x]))
     }
 
     #[test]
@@ -270,7 +270,7 @@ mod tests {
             [0.0, 1.0, 2.0, 4.0, 5.0].iter().flat_map(|&v| [v; 4]).chain([9.0; 4]).collect(),
         );
         let (outer, inner) = ([0.0, 10.0], [1.0, 2.0, 4.0]);
-        let at = |y: f32, x: f32| table.at(&SliceMix::between((&outer, y), (&inner, x)), [0.3, 0.8]);
+        let at = |y: f32, x: f32| table.at(&SliceMix::between([&outer, &inner], [y, x]), [0.3, 0.8]);
         for (y, x, expected) in
             [(0.0, 1.0, 0.0), (0.0, 1.5, 0.5), (-1.0, 3.0, 1.5), (10.0, 9.0, 9.0), (5.0, 0.0, 2.0), (2.5, 3.0, 2.875)]
         {

@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::medium::half_space_albedo;
 
 /// Coefficients of a medium in 1/mm for red, green and blue.
-pub struct Measured {
+pub struct MeasuredMedium {
     name: &'static str,
     /// Reduced scattering.
     pub scattering: [f32; 3],
@@ -20,17 +20,17 @@ pub struct Measured {
     pub absorption: [f32; 3],
 }
 
-const fn of(name: &'static str, scattering: [f32; 3], absorption: [f32; 3]) -> Measured {
-    Measured { name, scattering, absorption }
+const fn of(name: &'static str, scattering: [f32; 3], absorption: [f32; 3]) -> MeasuredMedium {
+    MeasuredMedium { name, scattering, absorption }
 }
 
 /// What pbrt has where nothing is given.
-const MILK: Measured = of("Wholemilk", [2.55, 3.21, 3.77], [0.0011, 0.0024, 0.014]);
+const MILK: MeasuredMedium = of("Wholemilk", [2.55, 3.21, 3.77], [0.0011, 0.0024, 0.014]);
 
 /// Jensen, Marschner, Levoy and Hanrahan, "A Practical Model for Subsurface Light Transport", figure 5; then Narasimhan
 /// et al., "Acquiring Scattering Properties of Participating Media by Dilution", table 1.
 #[rustfmt::skip]
-const MEASURED: [Measured; 47] = [
+const MEASURED: [MeasuredMedium; 47] = [
     of("Apple", [2.29, 2.39, 1.97], [0.0030, 0.0034, 0.046]),
     of("Chicken1", [0.15, 0.21, 0.38], [0.015, 0.077, 0.19]),
     of("Chicken2", [0.19, 0.25, 0.32], [0.018, 0.088, 0.20]),
@@ -81,7 +81,7 @@ const MEASURED: [Measured; 47] = [
 ];
 
 /// The medium of this name, if it is known.
-pub fn measured(name: &str) -> Option<&'static Measured> {
+pub fn measured(name: &str) -> Option<&'static MeasuredMedium> {
     MEASURED.iter().find(|medium| medium.name == name)
 }
 
@@ -173,7 +173,7 @@ impl Materials<'_> {
     }
 }
 
-impl Measured {
+impl MeasuredMedium {
     fn below(&self, scale: f32) -> Below {
         let scaled = |values: [f32; 3]| values.map(|value| value * scale);
         Below::of_coefficients(scaled(self.absorption), scaled(self.scattering))
