@@ -191,7 +191,7 @@ fn what_is_unsupported_is_named_with_what_becomes_of_it() {
         [(Outcome::Ignored, String::new(), "unsupported shape: it is left out of the picture".to_owned())]
     );
     for (kind, what) in [
-        (r#"<bsdf type="measured"><string name="filename" value="a.bsdf"/></bsdf>"#, "unsupported BSDF"),
+        (r#"<bsdf type="measured_polarized"><string name="filename" value="a.pbsdf"/></bsdf>"#, "unsupported BSDF"),
         (r#"<bsdf type="diffuse"><texture type="volume" name="reflectance"/></bsdf>"#, "unsupported texture"),
         (r#"<emitter type="directionalarea"/>"#, "unsupported emitter of a shape"),
         (r#"<medium type="homogeneous" name="interior"/>"#, "participating media"),

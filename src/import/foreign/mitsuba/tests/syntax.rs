@@ -182,7 +182,7 @@ fn nothing_is_dropped_in_silence() {
     let names: Vec<String> = notes(unknown).into_iter().map(|(_, name, _)| name).collect();
     assert_eq!(names, ["shine", "colour"]);
     let lacking = r#"<shape type="sdfgrid"/><medium type="homogeneous"/><emitter type="timed_sunsky"/>
-        <shape type="sphere"><bsdf type="measured"/></shape>"#;
+        <shape type="sphere"><bsdf type="measured_polarized"/></shape>"#;
     let outcomes = notes(lacking);
     assert_eq!(outcomes.len(), 4, "{outcomes:?}");
     assert!(outcomes.iter().all(|(outcome, ..)| *outcome == Outcome::Ignored));

@@ -385,7 +385,7 @@ fn skies_are_turned_with_their_transform() {
 
 #[test]
 fn measured_materials_are_those_of_their_files() {
-    let found = material("WorldBegin Material \"measured\" \"string filename\" \"coin.bsdf\"");
+    let found = material("Material \"measured\" \"string filename\" \"coin.bsdf\"");
     assert!(matches!(&found, MaterialDesc::Measured { file } if file == "coin.bsdf"), "{found:?}");
     let error = read_with("WorldBegin Material \"measured\" Shape \"sphere\"", &[]).err().unwrap().to_string();
     assert!(error.contains("needs a filename"), "{error}");
