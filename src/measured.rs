@@ -14,10 +14,10 @@ pub struct MeasuredTable<T> {
 /// columns, as `sqrt(2 theta / pi)`, and the azimuth from -pi to pi along their rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeasuredData {
-    /// Azimuths of the direction to the eye in radians, increasing: one or two if they do not matter; else from -pi on
+    /// Azimuths of the outgoing direction in radians, increasing: one or two if they do not matter; else from -pi on
     /// the whole circle, half of it or a quarter.
     pub phi: Vec<f32>,
-    /// Angles from the normal of the direction to the eye in radians, increasing within 0 and pi/2.
+    /// Angles from the normal of the outgoing direction in radians, increasing within 0 and pi/2.
     pub theta: Vec<f32>,
     /// The distribution of the normals of microfacets; one slice.
     pub ndf: MeasuredTable<f32>,

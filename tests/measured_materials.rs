@@ -16,9 +16,9 @@ use crate::util::root;
 /// What Mitsuba makes of a file.
 struct Expected {
     file: &'static str,
-    /// Directions to the eye and the light: angle from the normal and azimuth, in radians.
-    eye: [f32; 2],
-    light: [f32; 2],
+    /// Outgoing and incident directions: angle from the normal and azimuth, in radians.
+    wo: [f32; 2],
+    wi: [f32; 2],
     /// Red, green, blue and the density.
     eval: [f32; 4],
     /// The second and the first number of a sample, its direction, weight and density; a weight of 0 below the horizon.
@@ -30,128 +30,128 @@ struct Expected {
 const MITSUBA: [Expected; 16] = [
     Expected {
         file: "isotropic",
-        eye: [0.35, 0.3],
-        light: [0.5, -2.5],
+        wo: [0.35, 0.3],
+        wi: [0.5, -2.5],
         eval: [0.5232455, 0.3488328, 0.1453512, 0.7291617],
         u: [0.2, 0.7],
         sample: [-0.2632997, 0.1900892, 0.9458007, 0.7380056, 0.492004, 0.205002, 0.592069],
     },
     Expected {
         file: "isotropic",
-        eye: [0.9, -2.0],
-        light: [0.7, 1.1],
+        wo: [0.9, -2.0],
+        wi: [0.7, 1.1],
         eval: [0.7524841, 0.504423, 0.2150184, 1.096066],
         u: [0.55, 0.1],
         sample: [0.09103291, 0.8886428, 0.449474, 0.7609719, 0.5146994, 0.2273814, 0.4840028],
     },
     Expected {
         file: "isotropic",
-        eye: [1.2, 2.4],
-        light: [1.1, -0.9],
+        wo: [1.2, 2.4],
+        wi: [1.1, -0.9],
         eval: [0.7998497, 0.5618834, 0.2842561, 1.051363],
         u: [0.93, 0.4],
         sample: [-0.2631241, 0.873522, 0.4095425, 0.7053105, 0.4702073, 0.1959202, 0.03486897],
     },
     Expected {
         file: "isotropic",
-        eye: [0.02, 1.0],
-        light: [0.3, 2.0],
+        wo: [0.02, 1.0],
+        wi: [0.3, 2.0],
         eval: [0.4131069, 0.2754046, 0.1147519, 0.5597764],
         u: [0.4, 0.95],
         sample: [-0.3644879, -0.3038398, 0.8802443, 0.7620258, 0.5080194, 0.2116787, 0.3940839],
     },
     Expected {
         file: "mirrors",
-        eye: [0.35, 0.3],
-        light: [0.5, -2.5],
+        wo: [0.35, 0.3],
+        wi: [0.5, -2.5],
         eval: [0.4995306, 0.3331197, 0.1389736, 0.6311886],
         u: [0.2, 0.7],
         sample: [-0.3266838, -0.2536241, 0.9104684, 0.7275693, 0.485143, 0.2023122, 0.7347837],
     },
     Expected {
         file: "mirrors",
-        eye: [0.9, -2.0],
-        light: [0.7, 1.1],
+        wo: [0.9, -2.0],
+        wi: [0.7, 1.1],
         eval: [0.7423858, 0.5015938, 0.2206699, 0.972136],
         u: [0.55, 0.1],
         sample: [-0.3656885, 0.5537885, 0.7480575, 0.8783878, 0.5919992, 0.2578792, 0.3661369],
     },
     Expected {
         file: "mirrors",
-        eye: [1.2, 2.4],
-        light: [1.1, -0.9],
+        wo: [1.2, 2.4],
+        wi: [1.1, -0.9],
         eval: [0.8916982, 0.6289616, 0.3224355, 1.145247],
         u: [0.93, 0.4],
         sample: [-0.3169237, 0.6175942, 0.7198175, 0.8341099, 0.5561445, 0.2318515, 0.01651092],
     },
     Expected {
         file: "mirrors",
-        eye: [0.02, 1.0],
-        light: [0.3, 2.0],
+        wo: [0.02, 1.0],
+        wi: [0.3, 2.0],
         eval: [0.3530157, 0.2353438, 0.09805993, 0.4050556],
         u: [0.4, 0.95],
         sample: [0.5443575, -0.1022103, 0.832603, 0.7868762, 0.5245842, 0.2185769, 0.4935634],
     },
     Expected {
         file: "half_turn",
-        eye: [0.35, 0.3],
-        light: [0.5, -2.5],
+        wo: [0.35, 0.3],
+        wi: [0.5, -2.5],
         eval: [0.5433278, 0.362818, 0.1522232, 0.7602089],
         u: [0.2, 0.7],
         sample: [-0.4761857, -0.2875239, 0.8310099, 0.7145801, 0.4774203, 0.2007339, 0.7773364],
     },
     Expected {
         file: "half_turn",
-        eye: [0.9, -2.0],
-        light: [0.7, 1.1],
+        wo: [0.9, -2.0],
+        wi: [0.7, 1.1],
         eval: [0.7799587, 0.5210165, 0.2189173, 1.14324],
         u: [0.55, 0.1],
         sample: [-0.2840481, 0.5229955, 0.8036121, 0.7248216, 0.4840136, 0.2030708, 0.3763128],
     },
     Expected {
         file: "half_turn",
-        eye: [1.2, 2.4],
-        light: [1.1, -0.9],
+        wo: [1.2, 2.4],
+        wi: [1.1, -0.9],
         eval: [1.19149, 0.7966933, 0.3360969, 1.749872],
         u: [0.93, 0.4],
         sample: [-0.6351942, 0.09050796, 0.7670307, 1.254166, 0.8361194, 0.3483985, 0.02362408],
     },
     Expected {
         file: "half_turn",
-        eye: [0.02, 1.0],
-        light: [0.3, 2.0],
+        wo: [0.02, 1.0],
+        wi: [0.3, 2.0],
         eval: [0.3307826, 0.2205217, 0.09188407, 0.4011023],
         u: [0.4, 0.95],
         sample: [0.4454493, -0.1231539, 0.8867968, 0.7214924, 0.480995, 0.2004146, 0.4446922],
     },
     Expected {
         file: "whole",
-        eye: [0.35, 0.3],
-        light: [0.5, -2.5],
+        wo: [0.35, 0.3],
+        wi: [0.5, -2.5],
         eval: [0.5952752, 0.3974189, 0.1665865, 1.313139],
         u: [0.2, 0.7],
         sample: [-0.1451288, 0.05411437, 0.9879319, 0.4073384, 0.2720501, 0.1142136, 1.655662],
     },
     Expected {
         file: "whole",
-        eye: [0.9, -2.0],
-        light: [0.7, 1.1],
+        wo: [0.9, -2.0],
+        wi: [0.7, 1.1],
         eval: [0.8696197, 0.5835372, 0.2497744, 2.121824],
         u: [0.55, 0.1],
         sample: [-0.006882114, 0.5974315, 0.8018904, 0.6851885, 0.460103, 0.1975033, 1.054777],
     },
     Expected {
         file: "whole",
-        eye: [1.2, 2.4],
-        light: [1.1, -0.9],
+        wo: [1.2, 2.4],
+        wi: [1.1, -0.9],
         eval: [0.8565795, 0.5729482, 0.2420451, 3.012188],
         u: [0.93, 0.4],
         sample: [0.686898, -0.7119939, -0.1457255, 0.0, 0.0, 0.0, 0.2759183],
     },
     Expected {
         file: "whole",
-        eye: [0.02, 1.0],
-        light: [0.3, 2.0],
+        wo: [0.02, 1.0],
+        wi: [0.3, 2.0],
         eval: [0.2952574, 0.1968383, 0.08201595, 0.3655475],
         u: [0.4, 0.95],
         sample: [-0.2801192, 0.05295937, 0.9585031, 0.5000395, 0.3333597, 0.1389001, 1.071209],
@@ -175,14 +175,14 @@ fn assert_close(found: &[f32], expected: &[f32], what: &str) {
 
 #[test]
 fn values_densities_and_samples_are_those_of_mitsuba() {
-    for Expected { file, eye, light, eval, u, sample } in MITSUBA {
-        let (bsdf, wo) = (measured(file), direction(eye));
-        let found = bsdf.eval(wo, direction(light));
+    for Expected { file, wo, wi, eval, u, sample } in MITSUBA {
+        let (bsdf, wo) = (measured(file), direction(wo));
+        let found = bsdf.eval(wo, direction(wi));
         let [r, g, b] = found.value.to_array();
         assert_close(&[r, g, b, found.pdf], &eval, file);
         let [x, y, z, r, g, b, pdf] = sample;
         match bsdf.sample(wo, 0.5, u) {
-            None => assert!(z < 0.0 && r == 0.0, "{file} {eye:?} {u:?}"),
+            None => assert!(z < 0.0 && r == 0.0, "{file} {wo:?} {u:?}"),
             Some(found) => {
                 assert_close(&found.wi.to_array(), &[x, y, z], file);
                 assert_close(&found.weight.to_array(), &[r, g, b], file);

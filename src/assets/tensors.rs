@@ -18,7 +18,7 @@ const VERSION: [u8; 2] = [1, 0];
 const UINT8: u8 = 1;
 const FLOAT32: u8 = 10;
 
-/// The most directions to the eye.
+/// The most outgoing directions.
 const MAX_DIRECTIONS: usize = 4096;
 
 /// The most wavelengths.
@@ -160,7 +160,7 @@ fn parse(bytes: &[u8]) -> Result<MeasuredData, String> {
     let theta = field("theta_i")?.knots([0.0, FRAC_PI_2], MAX_DIRECTIONS)?;
     let directions = [phi.len(), theta.len()];
     if phi.len() * theta.len() > MAX_DIRECTIONS {
-        return Err(format!("the file has {directions:?} directions to the eye, more than {MAX_DIRECTIONS}"));
+        return Err(format!("the file has {directions:?} outgoing directions, more than {MAX_DIRECTIONS}"));
     }
     let data = MeasuredData {
         ndf: field("ndf")?.table(&[], MAX_DENSITY)?,

@@ -1,9 +1,9 @@
 //! Measured reflection (Dupuy and Jakob, "An Adaptive Parameterization for Efficient Material Acquisition and
 //! Rendering", 2018).
 //!
-//! For each direction to the eye of a table, the unit square is warped to the distribution of visible normals and then
+//! For each outgoing direction of a table, the unit square is warped to the distribution of visible normals and then
 //! to the half vectors between both directions; what is reflected is stored over that square, where it varies little.
-//! Light is sampled by its luminance there. Between the directions to the eye, tables are interpolated: densities then
+//! Light is sampled by its luminance there. Between the outgoing directions, tables are interpolated: densities then
 //! are means of densities, which are sampled exactly.
 
 use std::f32::consts::{FRAC_1_PI, FRAC_2_PI, FRAC_PI_2, PI, TAU};
@@ -35,7 +35,7 @@ struct Tables {
     albedo: Vec<Rgb>,
 }
 
-/// Which directions to the eye a file has.
+/// Which outgoing directions a file has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Symmetry {
     /// Those of one plane: turning the surface changes nothing.
@@ -57,7 +57,7 @@ const MIN_SIGMA: f32 = 1e-6;
 /// Samples along each axis by which the albedo is estimated.
 const ALBEDO_SAMPLES: usize = 16;
 
-/// What depends on the direction to the eye alone.
+/// What depends on the outgoing direction alone.
 struct View {
     /// That direction, among those of the file.
     o: Vec3,
@@ -96,8 +96,8 @@ impl Measured {
             jacobian,
             albedo: Vec::new(),
         };
-        let eyes = tables.phi.iter().flat_map(|&phi| tables.theta.iter().map(move |&theta| direction(theta, phi)));
-        tables.albedo = eyes.map(|wo| tables.estimated_albedo(wo)).collect();
+        let outgoing = tables.phi.iter().flat_map(|&phi| tables.theta.iter().map(move |&theta| direction(theta, phi)));
+        tables.albedo = outgoing.map(|wo| tables.estimated_albedo(wo)).collect();
         Self(Arc::new(tables))
     }
 

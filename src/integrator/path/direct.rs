@@ -113,7 +113,7 @@ fn illuminate<const PERTURBED: bool>(
     }
 }
 
-/// Drops shadow rays that carry little, and makes up for them by the others.
+/// Russian roulette of shadow rays, by what they carry.
 #[inline(always)]
 fn play_roulette(
     grid: &ContinuationGrid,
@@ -125,7 +125,7 @@ fn play_roulette(
     for i in 0..count.min(BATCH) {
         let contribution = direct.contribution.get(i);
         let probability = grid.shadow_ray_probability(contribution.max_channel(), rows.rr_scale[i]);
-        // The number by which the path goes on, from its other end: what traces few shadow rays goes on more often.
+        // The number of the path's own roulette, reversed: the two decisions are anticorrelated.
         let is_traced = 1.0 - u_bsdf.of(i)[3] <= probability;
         direct.contribution.set(i, contribution * (1.0 / probability));
         direct.status[i] = if is_traced { direct.status[i] } else { spawn::NONE };
