@@ -13,5 +13,5 @@ if [ -z "$wheel" ]; then
     "$environment/bin/maturin" build --locked --out "$environment/wheels"
     wheel=$(ls "$environment"/wheels/*.whl)
 fi
-"$environment/bin/pip" install --quiet "$wheel" pytest nbclient nbformat ipykernel
+"$environment/bin/pip" install --quiet "$wheel" pytest jsonschema nbclient nbformat ipykernel
 (cd "$environment" && "$environment/bin/python" -m pytest --quiet -p no:cacheprovider "$OLDPWD/tests")

@@ -53,10 +53,10 @@ fn room() -> Value {
     })
 }
 
-/// A room with a lamp at the bottom of a shaft, which lights nothing but a spot of the ceiling: only paths that happen
-/// to meet it contribute.
-pub fn room_with_shaft() -> Value {
-    let (bottom, height, half) = (0.4, 1.1, 0.15);
+/// A room with a lamp at the bottom of a shaft of this width, which lights nothing but a spot of the ceiling: only
+/// paths that happen to meet it contribute.
+pub fn room_with_shaft(width: f64) -> Value {
+    let (bottom, height, half) = (0.4, 1.1, 0.5 * width);
     let wall = |x: f64, z: f64, along: [f64; 3]| quad("black", [x, bottom, z], along, [0.0, height, 0.0]);
     json!({
         "camera": { "position": [-1.6, 1.2, 1.7], "look_at": [0.8, 0.2, -1.0], "vertical_fov_degrees": 60 },
@@ -101,8 +101,9 @@ fn guided_pictures_have_the_same_mean() {
 fn guiding_lowers_the_error_where_light_is_hard_to_find() {
     let difference = |guiding: bool| {
         let image = |seed| {
-            let overrides = Overrides { seed: Some(seed), spp: Some(32), threads: Some(2), ..Overrides::default() };
-            run(&room_with_shaft(), guiding, &overrides).image
+            let overrides =
+                Overrides { seed: Some(seed), spp: Some(32), size: Some([160, 160]), ..Overrides::default() };
+            run(&room_with_shaft(0.5), guiding, &overrides).image
         };
         let (a, b) = (image(1), image(2));
         let (a, b) = (a.layer(LayerKind::Color).unwrap(), b.layer(LayerKind::Color).unwrap());

@@ -101,6 +101,8 @@ fn light_is_not_sampled_where_glass_encloses_a_medium() {
         let mut scene = ball(&json!({ "scattering": 3 }));
         scene["materials"]["cloud"]["ior"] = json!(1.4);
         scene["sampler"]["spp"] = json!(4);
+        // Nothing ends a path in an infinite medium that only scatters.
+        scene["integrator"]["max_depth"] = json!(32);
         scene["shapes"] = shapes;
         merge(&mut scene, change);
         let prepared = prepare(&scene, &Overrides { threads: Some(2), ..Overrides::default() });

@@ -18,7 +18,7 @@ use steradian::internal::math::{DVec3, Ray, Vec2, Vec3};
 use steradian::internal::scene::Scene;
 use steradian::internal::texture::Footprint;
 
-use crate::util::folder::{Folder, good_scene, set};
+use crate::util::folder::{Folder, good_scene};
 use crate::util::root;
 
 fn lit(shape: Value) -> Value {
@@ -38,48 +38,6 @@ fn mesh(scene: &Scene, shape: usize) -> &Mesh {
 
 fn geometric_normal(mesh: &Mesh, triangle: usize) -> Vec3 {
     mesh.triangle_points(PrimId::new(triangle)).cross().normalize().as_vec3()
-}
-
-#[test]
-fn the_schema_accepts_scenes_and_refuses_slips() {
-    let schema: Value = serde_json::from_str(&import::schema()).unwrap();
-    let validator = jsonschema::validator_for(&schema).unwrap();
-    let good = good_scene();
-    let faults: Vec<String> = validator.iter_errors(&good).map(|e| e.to_string()).collect();
-    assert!(faults.is_empty(), "{faults:?}");
-    // Short forms of lists and colours.
-    for (path, value) in [
-        ("shapes", json!({ "type": "cube" })),
-        ("shapes[0].transform", json!({ "scale": 2 })),
-        ("lights", json!({ "type": "environment", "radiance": 1 })),
-        ("lights[0].intensity", json!(3.5)),
-        ("textures.tiles.scale", json!(2)),
-        ("instances", json!({ "object": "pair" })),
-        ("outputs", json!({ "file": "a.exr", "layers": "albedo" })),
-    ] {
-        let mut scene = good_scene();
-        set(&mut scene, path, value);
-        assert!(validator.is_valid(&scene), "{path}");
-        Folder::new().compile(&scene).unwrap();
-    }
-    for (path, value) in [
-        ("shaeps", json!([])),
-        ("camera.postion", json!([0, 0, 0])),
-        ("shapes[0].raduis", json!(1)),
-        ("shapes[0].type", json!("shpere")),
-        ("shapes[0].radius", json!("one")),
-        ("materials.Gold.roughnes", json!(0.1)),
-        ("materials.tiled.albedo", json!("red")),
-        ("shapes[0].transform", json!([{ "trnslate": [0, 0, 0] }])),
-        ("lights[0].intensity", json!([1, 1])),
-        ("film.filter.sgima", json!(1)),
-        ("integrator", json!({ "type": "normal", "max_depth": 3 })),
-        ("camera", Value::Null),
-    ] {
-        let mut scene = good_scene();
-        set(&mut scene, path, value);
-        assert!(!validator.is_valid(&scene), "{path}");
-    }
 }
 
 #[test]

@@ -12,7 +12,7 @@ use crate::util::program::{run, stderr_of};
 /// A folder with a room as `room.json` and guides for it in `a.state` and `b.state`.
 fn trained() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let mut room = room_with_shaft();
+    let mut room = room_with_shaft(0.3);
     room["film"] = json!({ "width": 192, "height": 192, "filter": { "type": "box" } });
     std::fs::write(folder.path().join("room.json"), room.to_string()).unwrap();
     for (name, spp) in [("a", 16), ("b", 8)] {
