@@ -375,7 +375,7 @@ pub enum RouletteDesc {
     /// From `rr_depth` segments on, by the throughput of the path.
     #[default]
     Throughput,
-    /// From the first scattering on, by what a path may add to its pixel and by what it costs, as a pilot of an eighth
+    /// From the second scattering on, by what a path may add to its pixel and by what it costs, as a pilot of an eighth
     /// of a sample of each pixel finds both; shadow rays by what they carry. `rr_depth` is ignored.
     Auto,
     /// Never.

@@ -17,13 +17,17 @@ pub enum Roulette {
         /// At least 1.
         from: u32,
     },
-    /// From the first scattering on, by [`ContinuationGrid`]; where nothing is known, as `Throughput` from 5.
+    /// From the second scattering on, by [`ContinuationGrid`]; where nothing is known, as `Throughput` from 5.
     Auto,
 }
 
 /// With estimates, a path goes on with at least this part of what scattering has left of it: wrong estimates cannot
 /// make it much brighter at once.
 const LEAST_SHARE: f32 = 0.75;
+
+/// Shadow rays are traced with this many times the probability that a path with their contribution would go on with:
+/// samples of direct light are spread more evenly than the variance of a sample suggests, and thinning disturbs that.
+const SHADOW_SCALE: f32 = 2.0;
 
 /// With which probability paths go on.
 #[derive(Clone, Copy, Debug)]
@@ -51,7 +55,8 @@ impl Roulette {
         let from = match self {
             Self::Off => u32::MAX,
             Self::Throughput { from } => from,
-            Self::Auto if has_estimates => return SurvivalRule { least: 0.0, least_share: LEAST_SHARE },
+            // Paths that end at the first take more from the even spread of a pixel's points than they save.
+            Self::Auto if has_estimates && bounce > 0 => return SurvivalRule { least: 0.0, least_share: LEAST_SHARE },
             Self::Auto => DEFAULT_RR_DEPTH,
         };
         SurvivalRule { least: if bounce + 1 >= from { 0.0 } else { 1.0 }, least_share: 0.0 }
@@ -164,7 +169,7 @@ impl ContinuationGrid {
     /// With which probability a shadow ray that carries `contribution` is traced.
     #[inline(always)]
     pub(super) fn shadow_ray_probability(&self, contribution: f32, rr_scale: f32) -> f32 {
-        let value = contribution * rr_scale * self.scale;
+        let value = contribution * rr_scale * self.scale * SHADOW_SCALE;
         // NaN becomes 1: it must be seen in the sample.
         if value < 1.0 { value } else { 1.0 }
     }
@@ -256,7 +261,7 @@ mod tests {
         let mut scaled = grid.clone();
         scaled.scale(2.0);
         assert_eq!(found(&scaled, 0.3, true), 2.0 * found(&grid, 0.3, true));
-        let shadow_rays = |contribution| scaled.shadow_ray_probability(contribution, 0.5);
+        let shadow_rays = |contribution| scaled.shadow_ray_probability(contribution, 0.5 / SHADOW_SCALE);
         assert_eq!([0.0, 0.25, 1.0, 3.0, f32::NAN].map(shadow_rays), [0.0, 0.25, 1.0, 1.0, 1.0]);
     }
 
@@ -274,7 +279,8 @@ mod tests {
         assert_eq!([0, 100].map(|bounce| dim(Roulette::Off, bounce, true)), [1.0, 1.0]);
         assert_eq!([1, 2].map(|bounce| dim(Roulette::Throughput { from: 3 }, bounce, false)), [1.0, 0.01]);
         assert_eq!([3, 4].map(|bounce| dim(Roulette::Auto, bounce, false)), [1.0, 0.01]);
-        let rule = Roulette::Auto.rule(0, true);
+        assert_eq!(dim(Roulette::Auto, 0, true), 1.0);
+        let rule = Roulette::Auto.rule(1, true);
         assert_eq!([0.01, 0.3, 4.0].map(|value| rule.probability(value, 0.2)), [LEAST_SHARE * 0.2, 0.3, 1.0]);
         assert_eq!(rule.probability(f32::NAN, 0.2), 1.0);
     }
