@@ -1,14 +1,15 @@
 //! Denoising with Intel Open Image Denoise, a library that is loaded at run time if it is needed.
 //!
-//! Albedo and normals are denoised first, each by a filter of its own; the picture is denoised with the help of both,
-//! linear and without a limit; alpha and parts of the picture (light groups, kinds of light) go through filters of
-//! their own with the same two. See `docs/denoise.md`.
+//! Albedo and normals are denoised first if they are noisy, each by a filter of its own; the picture is denoised with
+//! the help of both, linear and without a limit; alpha and parts of the picture (light groups, kinds of light) go
+//! through filters of their own with the same two. See `docs/denoise.md`.
 
 mod clean;
 mod file;
 mod image;
 mod layers;
 mod locate;
+mod noise;
 mod oidn;
 mod prepared;
 mod split;
@@ -50,16 +51,16 @@ impl Denoiser {
     }
 }
 
-/// Which features helped.
+/// How a feature was used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Features {
-    /// None.
+pub enum Feature {
+    /// Not at all: there is none, or it is 0 everywhere.
     #[default]
     None,
-    /// Albedo.
-    Albedo,
-    /// Albedo and normals.
-    AlbedoAndNormal,
+    /// As it is: it is free of noise.
+    AsIs,
+    /// After a filter of its own.
+    Denoised,
 }
 
 /// What denoising did.
@@ -67,8 +68,10 @@ pub enum Features {
 pub struct Report {
     /// The library's version.
     pub version: String,
-    /// Which features helped.
-    pub features: Features,
+    /// How albedo was used.
+    pub albedo: Feature,
+    /// How normals were used.
+    pub normal: Feature,
     /// Wall-clock seconds.
     pub seconds: f64,
     /// Pixels that were not finite and were made from their neighbours before, counted in each layer.
@@ -85,13 +88,16 @@ impl Report {
     /// The attribute of EXR files with the parameters of their denoising.
     pub const ATTRIBUTE: &str = "steradian/denoised";
 
-    /// The value of [`Report::ATTRIBUTE`], such as `OIDN 2.5.1, albedo and normal prefiltered`.
+    /// The value of [`Report::ATTRIBUTE`], such as `OIDN 2.5.1, albedo as it is, normal prefiltered`.
     pub fn attribute(&self) -> String {
-        let features = match self.features {
-            Features::None => "without albedo and normal",
-            Features::Albedo => "albedo prefiltered",
-            Features::AlbedoAndNormal => "albedo and normal prefiltered",
+        let used = |name: &str, feature| match feature {
+            Feature::None => None,
+            Feature::AsIs => Some(format!("{name} as it is")),
+            Feature::Denoised => Some(format!("{name} prefiltered")),
         };
+        let used: Vec<String> =
+            [used("albedo", self.albedo), used("normal", self.normal)].into_iter().flatten().collect();
+        let features = if used.is_empty() { "without albedo and normal".to_owned() } else { used.join(", ") };
         format!("OIDN {}, {features}", self.version)
     }
 }

@@ -1,14 +1,15 @@
-//! The filters of one picture: features first, then everything that is denoised with their help.
+//! The filters of one picture: features first, if they are noisy, then everything that is denoised with their help.
 
 use std::time::Instant;
 
 use super::clean::{neighbours, replace_non_finite};
+use super::noise::Sample;
 use super::oidn::{Inputs, Triple};
 use super::split::scale_to_sum;
-use super::{Denoiser, Features, Report};
+use super::{Denoiser, Feature, Report};
 use crate::error::Result;
 
-/// A picture's features, denoised, and what was done so far.
+/// A picture's features without noise, and what was done so far.
 pub struct Prepared<'d> {
     denoiser: &'d Denoiser,
     size: [usize; 2],
@@ -19,9 +20,9 @@ pub struct Prepared<'d> {
 }
 
 impl<'d> Prepared<'d> {
-    /// Denoises the features of a picture of `size` (width, height) pixels, row by row. Albedo is cut to 0..1, normals
-    /// to -1..1. Features that are 0 everywhere hold no information and are left out, as are normals without albedo,
-    /// which the library has no use for.
+    /// Takes the features of a picture of `size` (width, height) pixels, row by row, and denoises those that are noisy.
+    /// Albedo is cut to 0..1, normals to -1..1. Features that are 0 everywhere hold no information and are left out, as
+    /// are normals without albedo, which the library has no use for.
     pub fn new(
         denoiser: &'d Denoiser,
         size: [usize; 2],
@@ -31,19 +32,35 @@ impl<'d> Prepared<'d> {
         let report = Report { version: denoiser.version(), ..Report::default() };
         let mut prepared = Self { denoiser, size, albedo: None, normal: None, report, start: Instant::now() };
         let is_not_black = |pixels: &Vec<Triple>| pixels.as_flattened().iter().any(|v| *v != 0.0);
-        let Some(mut albedo) = albedo.filter(is_not_black) else { return Ok(prepared) };
-        prepared.clean(&mut albedo);
-        albedo.as_flattened_mut().iter_mut().for_each(|v| *v = v.clamp(0.0, 1.0));
-        prepared.albedo = Some(prepared.filter(Inputs { albedo: Some(&albedo), ..Inputs::default() })?);
-        prepared.report.features = Features::Albedo;
-        drop(albedo);
-        if let Some(mut normal) = normal.filter(is_not_black) {
-            prepared.clean(&mut normal);
-            normal.as_flattened_mut().iter_mut().for_each(|v| *v = v.clamp(-1.0, 1.0));
-            prepared.normal = Some(prepared.filter(Inputs { normal: Some(&normal), ..Inputs::default() })?);
-            prepared.report.features = Features::AlbedoAndNormal;
+        let Some(albedo) = albedo.filter(is_not_black) else { return Ok(prepared) };
+        let (albedo, use_of_albedo) =
+            prepared.feature(albedo, 0.0, |albedo| Inputs { albedo: Some(albedo), ..Inputs::default() })?;
+        (prepared.albedo, prepared.report.albedo) = (Some(albedo), use_of_albedo);
+        if let Some(normal) = normal.filter(is_not_black) {
+            let (normal, use_of_normal) =
+                prepared.feature(normal, -1.0, |normal| Inputs { normal: Some(normal), ..Inputs::default() })?;
+            (prepared.normal, prepared.report.normal) = (Some(normal), use_of_normal);
         }
         Ok(prepared)
+    }
+
+    /// A feature between `least` and 1, denoised if it is noisy.
+    fn feature(
+        &mut self,
+        mut pixels: Vec<Triple>,
+        least: f32,
+        inputs: impl Fn(&[Triple]) -> Inputs,
+    ) -> Result<(Vec<Triple>, Feature)> {
+        self.clean(&mut pixels);
+        pixels.as_flattened_mut().iter_mut().for_each(|v| *v = v.clamp(least, 1.0));
+        if let Some(sample) = Sample::of_noisiest(&pixels, self.size) {
+            let filtered = self.filter(sample.size, inputs(&sample.pixels))?;
+            if !sample.is_noisy(&filtered) {
+                return Ok((pixels, Feature::AsIs));
+            }
+        }
+        let filtered = self.filter(self.size, inputs(&pixels))?;
+        Ok((filtered, Feature::Denoised))
     }
 
     /// Denoises the picture: linear colours of any size; negative ones count as 0.
@@ -76,7 +93,7 @@ impl<'d> Prepared<'d> {
         if noisy.iter().all(|[a, ..]| *a == 0.0 || *a == 1.0) {
             return Ok(noisy.iter().map(|[a, ..]| *a).collect());
         }
-        let denoised = self.filter(self.with_features(&noisy))?;
+        let denoised = self.filter(self.size, self.with_features(&noisy))?;
         let width = self.size[0];
         Ok((0..noisy.len())
             .map(|i| {
@@ -108,12 +125,12 @@ impl<'d> Prepared<'d> {
         if color.as_flattened().iter().all(|v| *v <= 0.0) {
             return Ok(vec![[0.0; 3]; color.len()]);
         }
-        self.filter(Inputs { hdr: true, ..self.with_features(color) })
+        self.filter(self.size, Inputs { hdr: true, ..self.with_features(color) })
     }
 
-    fn filter(&self, inputs: Inputs) -> Result<Vec<Triple>> {
-        let mut output = vec![[0.0; 3]; self.size[0] * self.size[1]];
-        self.denoiser.device.filter(self.size, inputs, &mut output)?;
+    fn filter(&self, size: [usize; 2], inputs: Inputs) -> Result<Vec<Triple>> {
+        let mut output = vec![[0.0; 3]; size[0] * size[1]];
+        self.denoiser.device.filter(size, inputs, &mut output)?;
         Ok(output)
     }
 

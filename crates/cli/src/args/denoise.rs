@@ -12,8 +12,8 @@ Denoise an EXR file with Intel Open Image Denoise
 
 The colour of any renderer's EXR file is denoised, with the help of its layers of albedo and normals: Steradian's \
 (feature_albedo, feature_normal), else those of Blender (Denoising Albedo, Denoising Normal), pbrt (Albedo, Ns, N), \
-Mitsuba (albedo, sh_normal). They are denoised first. Light groups (light_NAME) that add up to the colour still do so \
-afterwards. All other layers and attributes stay as they are; the colour as it was becomes layer noisy.";
+Mitsuba (albedo, sh_normal). Noisy ones are denoised first. Light groups (light_NAME) that add up to the colour still \
+do so afterwards. All other layers and attributes stay as they are; the colour as it was becomes layer noisy.";
 
 pub const EXAMPLES: &str = "\
 Examples:
