@@ -31,7 +31,7 @@ as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
 # What the build needs, as Debian packages: a C compiler, libclang for bindgen, Embree's headers.
 case "${1:-render}" in
     render) echo "Steradian: installs what is missing, builds (about 5 minutes with 2 cores), renders scenes/gallery.json (about a quarter of a minute) to $PWD/gallery.png and gallery.exr" >&2 ;;
-    test) echo "Steradian: installs what is missing, builds and runs all tests (about 12 minutes with 2 cores)" >&2 ;;
+    test) echo "Steradian: installs what is missing, builds and runs all tests (12 to 22 minutes with 2 cores)" >&2 ;;
 esac
 packages=()
 command -v cc >/dev/null || packages+=(build-essential)
