@@ -180,14 +180,14 @@ fn the_result_does_not_depend_on_threads() {
 fn features_are_denoised_only_if_they_are_noisy() {
     let denoiser = denoiser(2);
     let uses = |camera: Value| {
-        let mut scene = room(4, &["feature_albedo", "feature_normal"]);
+        let mut scene = room(16, &["feature_albedo", "feature_normal"]);
         let film = json!({ "width": 512, "height": 256 });
         merge(&mut scene, json!({ "film": film, "integrator": { "type": "path", "max_depth": 2 }, "camera": camera }));
         let report = denoise_image(&denoiser, &mut render(&scene)).unwrap();
         [report.albedo, report.normal]
     };
-    assert_eq!(uses(json!({})), [Feature::AsIs; 2]);
-    assert_eq!(uses(json!({ "lens": { "radius": 0.3, "focus_distance": 2 } })), [Feature::Denoised; 2]);
+    assert_eq!(uses(json!({})), [Feature::Clean; 2]);
+    assert_eq!(uses(json!({ "lens": { "radius": 0.3, "focus_distance": 2 } })), [Feature::Prefiltered; 2]);
 }
 
 #[test]

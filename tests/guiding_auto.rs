@@ -18,7 +18,7 @@ use crate::util::render::{assert_blocks_agree, block_means};
 /// The fewest samples that a pilot is traced for.
 const SPP: u32 = 64;
 
-/// Where most light comes by few ways: the pilot finds a ratio of variances between 2.4 and 3.1, as the seed has it.
+/// Where most light comes by few ways: the pilot finds a ratio of variances between 2.4 and 3.1, by seed.
 fn hard() -> Value {
     let mut scene = room_with_shaft(0.5);
     scene["integrator"]["max_depth"] = json!(4);

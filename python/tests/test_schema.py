@@ -11,7 +11,7 @@ import steradian as st
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 VALIDATOR = jsonschema.Draft202012Validator(json.loads(st.schema()))
 
-# Every kind of shape and light, instances of instances, and several materials.
+# Shapes, lights and materials of many kinds, instances of instances.
 SCENE = {
     "film": {"width": 64, "height": 32, "crop": [8, 8, 16, 16], "filter": {"type": "gaussian"}},
     "camera": {
@@ -84,7 +84,7 @@ def faults(scene):
     return [error.message for error in VALIDATOR.iter_errors(scene)]
 
 
-def test_the_schema_is_one():
+def test_the_schema_is_valid():
     jsonschema.Draft202012Validator.check_schema(json.loads(st.schema()))
 
 

@@ -57,10 +57,10 @@ pub enum Feature {
     /// Not at all: there is none, or it is 0 everywhere.
     #[default]
     None,
-    /// As it is: it is free of noise.
-    AsIs,
+    /// As it is, free of noise.
+    Clean,
     /// After a filter of its own.
-    Denoised,
+    Prefiltered,
 }
 
 /// What denoising did.
@@ -88,12 +88,12 @@ impl Report {
     /// The attribute of EXR files with the parameters of their denoising.
     pub const ATTRIBUTE: &str = "steradian/denoised";
 
-    /// The value of [`Report::ATTRIBUTE`], such as `OIDN 2.5.1, albedo as it is, normal prefiltered`.
+    /// The value of [`Report::ATTRIBUTE`], such as `OIDN 2.5.1, albedo clean, normal prefiltered`.
     pub fn attribute(&self) -> String {
         let used = |name: &str, feature| match feature {
             Feature::None => None,
-            Feature::AsIs => Some(format!("{name} as it is")),
-            Feature::Denoised => Some(format!("{name} prefiltered")),
+            Feature::Clean => Some(format!("{name} clean")),
+            Feature::Prefiltered => Some(format!("{name} prefiltered")),
         };
         let used: Vec<String> =
             [used("albedo", self.albedo), used("normal", self.normal)].into_iter().flatten().collect();

@@ -9,30 +9,30 @@ const SIDE: usize = 64;
 /// Near the rim of a block the filter lacks context: changes there do not count.
 const RIM: usize = 8;
 
-/// Blocks in a row and rows of blocks of a sample.
-const SAMPLE: [usize; 2] = [4, 2];
+/// Columns and rows of blocks in a mosaic.
+const BLOCKS: [usize; 2] = [4, 2];
 
-/// The least pixels of a picture, in samples, for which a sample costs little beside the whole.
-const LEAST_SAMPLES: usize = 4;
+/// Pictures of fewer pixels than this many mosaics are filtered whole: a mosaic would cost nearly as much.
+const LEAST_MOSAICS: usize = 4;
 
-/// The largest mean change, in units of albedo and of normals, that passes as none: pixels of edges change too.
-const LARGEST_CHANGE: f64 = 0.01;
+/// The largest mean change, in units of albedo and of normals, of a feature without noise, whose edges change too.
+const LARGEST_CHANGE: f64 = 0.0025;
 
 /// Blocks of a feature, side by side.
-pub(super) struct Sample {
+pub(super) struct Mosaic {
     /// Width and height.
     pub size: [usize; 2],
     /// Row by row.
     pub pixels: Vec<Triple>,
 }
 
-impl Sample {
+impl Mosaic {
     /// The blocks of a feature of `size` pixels in which pixels differ most from the median of those around them;
-    /// `None` if there are hardly more pixels than in a sample.
+    /// `None` if the picture has hardly more pixels than a mosaic.
     pub fn of_noisiest(pixels: &[Triple], size: [usize; 2]) -> Option<Self> {
         let blocks = size.map(|side| side / SIDE);
-        let count = SAMPLE[0] * SAMPLE[1];
-        if blocks[0] * blocks[1] < LEAST_SAMPLES * count {
+        let count = BLOCKS[0] * BLOCKS[1];
+        if blocks[0] * blocks[1] < LEAST_MOSAICS * count {
             return None;
         }
         let mut roughness = vec![0.0; blocks[0] * blocks[1]];
@@ -43,17 +43,17 @@ impl Sample {
         }
         let mut order: Vec<usize> = (0..roughness.len()).collect();
         order.sort_by(|&a, &b| roughness[b].total_cmp(&roughness[a]));
-        let mut sample = Vec::with_capacity(count * SIDE * SIDE);
-        for row in 0..SAMPLE[1] * SIDE {
-            for block in &order[row / SIDE * SAMPLE[0]..][..SAMPLE[0]] {
+        let mut mosaic = Vec::with_capacity(count * SIDE * SIDE);
+        for row in 0..BLOCKS[1] * SIDE {
+            for block in &order[row / SIDE * BLOCKS[0]..][..BLOCKS[0]] {
                 let (x, y) = (block % blocks[0] * SIDE, block / blocks[0] * SIDE + row % SIDE);
-                sample.extend_from_slice(&pixels[y * size[0] + x..][..SIDE]);
+                mosaic.extend_from_slice(&pixels[y * size[0] + x..][..SIDE]);
             }
         }
-        Some(Self { size: SAMPLE.map(|count| count * SIDE), pixels: sample })
+        Some(Self { size: BLOCKS.map(|count| count * SIDE), pixels: mosaic })
     }
 
-    /// Whether the sample, filtered, differs from itself by more than edges do.
+    /// Whether the mosaic, filtered, differs from itself by more than edges do.
     pub fn is_noisy(&self, filtered: &[Triple]) -> bool {
         let change = self.mean_change(filtered);
         tracing::debug!("denoising: a filter changes the noisiest blocks of a feature by {change:.5}");
@@ -109,29 +109,29 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_begins_with_the_noisiest_blocks() {
+    fn a_mosaic_begins_with_the_noisiest_blocks() {
         let pixels = feature();
-        let sample = Sample::of_noisiest(&pixels, SIZE).unwrap();
-        assert_eq!((sample.size, sample.pixels.len()), ([256, 128], 256 * 128));
+        let mosaic = Mosaic::of_noisiest(&pixels, SIZE).unwrap();
+        assert_eq!((mosaic.size, mosaic.pixels.len()), ([256, 128], 256 * 128));
         for row in [0, 17, 63] {
             let of_block = |x: usize, y: usize| &pixels[(y * SIDE + row) * SIZE[0] + x * SIDE..][..SIDE];
-            assert_eq!(&sample.pixels[row * 256..][..SIDE], of_block(5, 3));
-            assert_eq!(&sample.pixels[row * 256 + SIDE..][..SIDE], of_block(2, 1));
+            assert_eq!(&mosaic.pixels[row * 256..][..SIDE], of_block(5, 3));
+            assert_eq!(&mosaic.pixels[row * 256 + SIDE..][..SIDE], of_block(2, 1));
         }
-        assert!(Sample::of_noisiest(&pixels, [320, 512]).is_some());
-        assert!(Sample::of_noisiest(&pixels[..256 * 256], [256, 256]).is_none());
+        assert!(Mosaic::of_noisiest(&pixels, [320, 512]).is_some());
+        assert!(Mosaic::of_noisiest(&pixels[..256 * 256], [256, 256]).is_none());
     }
 
     #[test]
     fn what_the_filter_changes_in_the_middle_of_blocks_is_noise() {
         let pixels = feature();
-        let sample = Sample::of_noisiest(&pixels, SIZE).unwrap();
-        assert!(!sample.is_noisy(&sample.pixels));
-        let mut smoothed = sample.pixels.clone();
+        let mosaic = Mosaic::of_noisiest(&pixels, SIZE).unwrap();
+        assert!(!mosaic.is_noisy(&mosaic.pixels));
+        let mut smoothed = mosaic.pixels.clone();
         smoothed.iter_mut().enumerate().filter(|(i, _)| i % 256 < RIM).for_each(|(_, pixel)| *pixel = [0.9; 3]);
-        assert!(!sample.is_noisy(&smoothed));
+        assert!(!mosaic.is_noisy(&smoothed));
         // One block of eight of noise, whose mean absolute deviation is a quarter.
         (0..64 * 256).filter(|i| i % 256 < SIDE).for_each(|i| smoothed[i] = [0.5; 3]);
-        assert!(sample.is_noisy(&smoothed));
+        assert!(mosaic.is_noisy(&smoothed));
     }
 }

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::clean::{neighbours, replace_non_finite};
-use super::noise::Sample;
+use super::noise::Mosaic;
 use super::oidn::{Inputs, Triple};
 use super::split::scale_to_sum;
 use super::{Denoiser, Feature, Report};
@@ -53,14 +53,14 @@ impl<'d> Prepared<'d> {
     ) -> Result<(Vec<Triple>, Feature)> {
         self.clean(&mut pixels);
         pixels.as_flattened_mut().iter_mut().for_each(|v| *v = v.clamp(least, 1.0));
-        if let Some(sample) = Sample::of_noisiest(&pixels, self.size) {
-            let filtered = self.filter(sample.size, inputs(&sample.pixels))?;
-            if !sample.is_noisy(&filtered) {
-                return Ok((pixels, Feature::AsIs));
+        if let Some(mosaic) = Mosaic::of_noisiest(&pixels, self.size) {
+            let filtered = self.filter(mosaic.size, inputs(&mosaic.pixels))?;
+            if !mosaic.is_noisy(&filtered) {
+                return Ok((pixels, Feature::Clean));
             }
         }
         let filtered = self.filter(self.size, inputs(&pixels))?;
-        Ok((filtered, Feature::Denoised))
+        Ok((filtered, Feature::Prefiltered))
     }
 
     /// Denoises the picture: linear colours of any size; negative ones count as 0.

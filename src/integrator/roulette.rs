@@ -26,7 +26,7 @@ pub enum Roulette {
 const LEAST_SHARE: f32 = 0.75;
 
 /// Shadow rays are traced with this many times the probability that a path with their contribution would go on with:
-/// samples of direct light are spread more evenly than the variance of a sample suggests, and thinning disturbs that.
+/// direct light is stratified better than the variance of a sample suggests, and roulette disturbs that.
 const SHADOW_SCALE: f32 = 2.0;
 
 /// With which probability paths go on.
@@ -55,7 +55,7 @@ impl Roulette {
         let from = match self {
             Self::Off => u32::MAX,
             Self::Throughput { from } => from,
-            // Paths that end at the first take more from the even spread of a pixel's points than they save.
+            // At the first, roulette disturbs the stratification of a pixel's samples by more than it saves.
             Self::Auto if has_estimates && bounce > 0 => return SurvivalRule { least: 0.0, least_share: LEAST_SHARE },
             Self::Auto => DEFAULT_RR_DEPTH,
         };
