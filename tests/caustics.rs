@@ -94,6 +94,7 @@ fn photons_lower_the_error_of_a_small_lamp_behind_glass() {
         "type": "sphere", "material": "white", "radius": 0.2, "transform": [{ "translate": [0, 2.5, 0] }],
         "emission": { "radiance": [60, 50, 45] }
     });
+    scene["integrator"]["roulette"] = json!("throughput");
     let difference = |caustics| {
         let [a, b] = [1, 2].map(|seed| of_seed(&scene, caustics, seed, 32));
         let (a, b) = (a.layer(LayerKind::Color).unwrap(), b.layer(LayerKind::Color).unwrap());

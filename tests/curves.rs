@@ -89,7 +89,7 @@ fn a_straight_curve_looks_like_a_cylinder() {
 fn curves_and_points_are_the_same_for_any_threads_accelerator_and_replay() {
     let mut scene = hairy(
         &json!({ "type": "hair", "eumelanin": 0.4, "azimuthal_roughness": 0.2 }),
-        json!({ "integrator": { "type": "path", "max_depth": 12 }, "sampler": { "spp": 4 },
+        json!({ "integrator": { "type": "path", "max_depth": 12, "rr_depth": 5 }, "sampler": { "spp": 4 },
             "lights": [{ "type": "directional", "direction": [-1, -2, -1], "irradiance": 2 }] }),
     );
     let shapes = scene["shapes"].as_array_mut().unwrap();

@@ -99,11 +99,13 @@ fn guided_pictures_have_the_same_mean() {
 /// Two renders differ by twice the variance of one.
 #[test]
 fn guiding_lowers_the_error_where_light_is_hard_to_find() {
+    let mut scene = room_with_shaft(0.5);
+    scene["integrator"]["roulette"] = json!("throughput");
     let difference = |guiding: bool| {
         let image = |seed| {
             let overrides =
                 Overrides { seed: Some(seed), spp: Some(32), size: Some([160, 160]), ..Overrides::default() };
-            run(&room_with_shaft(0.5), guiding, &overrides).image
+            run(&scene, guiding, &overrides).image
         };
         let (a, b) = (image(1), image(2));
         let (a, b) = (a.layer(LayerKind::Color).unwrap(), b.layer(LayerKind::Color).unwrap());

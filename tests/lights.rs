@@ -234,7 +234,8 @@ fn corner(integrator: Value) -> Value {
     );
     merge(
         &mut scene,
-        json!({ "camera": { "vertical_fov_degrees": 40 }, "sampler": { "spp": 16 }, "integrator": { "type": "path" } }),
+        json!({ "camera": { "vertical_fov_degrees": 40 }, "sampler": { "spp": 16 },
+            "integrator": { "type": "path", "roulette": "throughput" } }),
     );
     merge(&mut scene["integrator"], integrator);
     scene

@@ -131,14 +131,22 @@ fn the_option_replaces_what_the_scene_says() {
         let desc = serde_json::from_value(scene.clone()).unwrap();
         Settings::new(&desc, &Overrides { roulette, ..Overrides::default() })
     };
-    let of = |roulette| match settings(&room(), roulette).unwrap().integrator {
-        IntegratorDesc::Path { roulette, rr_depth, .. } => (roulette, rr_depth),
-        other => panic!("{other:?}"),
+    let of = |scene: &Value, chosen| {
+        let integrator = settings(scene, chosen).unwrap().integrator;
+        let IntegratorDesc::Path { rr_depth, .. } = integrator else { panic!("{integrator:?}") };
+        (integrator.roulette().unwrap(), rr_depth)
     };
-    assert_eq!(of(None), (RouletteDesc::Throughput, 64));
-    assert_eq!(of(Some(RouletteDesc::Throughput)), (RouletteDesc::Throughput, 5));
-    assert_eq!(of(Some(RouletteDesc::Auto)).0, RouletteDesc::Auto);
-    assert_eq!(of(Some(RouletteDesc::Off)).0, RouletteDesc::Off);
+    let (auto, throughput, off) = (RouletteDesc::Auto, RouletteDesc::Throughput, RouletteDesc::Off);
+    assert_eq!(of(&room(), None), (throughput, Some(64)));
+    assert_eq!(of(&room(), Some(throughput)), (throughput, Some(5)));
+    assert_eq!(of(&room(), Some(auto)).0, auto);
+    assert_eq!(of(&room(), Some(off)).0, off);
+    let mut plain = room();
+    plain["integrator"] = json!({ "type": "path" });
+    assert_eq!(of(&plain, None), (auto, None));
+    assert_eq!(of(&plain, Some(throughput)), (throughput, None));
+    plain["integrator"] = json!({ "type": "path", "rr_depth": 3, "roulette": "auto" });
+    assert_eq!(of(&plain, None).0, auto);
     let mut whitted = room();
     whitted["integrator"] = json!({ "type": "whitted" });
     assert!(matches!(settings(&whitted, Some(RouletteDesc::Auto)), Err(Error::Setting { message, .. })

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Checks the crates as they would be published: their sizes, their files, that they compile from these alone, and that the library's documentation
-# compiles as on docs.rs, without Embree and libclang.
+# Checks the crates as they would be published: their sizes, their files, that they compile from these alone, and that their documentation compiles,
+# that of private items too, the library's as on docs.rs, without Embree and libclang.
 #
 #   tools/check_package.sh          type-checks the unpacked crates
 #   tools/check_package.sh build    builds them, as `cargo publish` does
@@ -43,5 +43,8 @@ cp Cargo.lock "$aside"
 cd "$aside"
 cargo "${1:-check}" --offline --workspace --target-dir "$target"
 
+export RUSTDOCFLAGS="-D warnings"
+document() { cargo doc --offline --no-deps --lib --document-private-items --target-dir "$target" "${@/#/--package=}"; }
+document steradian-bench
 # docs.rs has a C compiler, but neither Embree nor libclang: wrong paths do no harm.
-DOCS_RS=1 EMBREE_DIR=/nonexistent LIBCLANG_PATH=/nonexistent cargo doc --offline --no-deps --package steradian --lib --target-dir "$target"
+DOCS_RS=1 EMBREE_DIR=/nonexistent LIBCLANG_PATH=/nonexistent document steradian

@@ -128,7 +128,7 @@ fn check_integrator(files: &CompileContext, integrator: &IntegratorDesc) -> Resu
         IntegratorDesc::Path { max_depth: 0, .. } => {
             return Err(files.error("integrator.max_depth", "must be at least 1"));
         }
-        IntegratorDesc::Path { rr_depth: 0, .. } => {
+        IntegratorDesc::Path { rr_depth: Some(0), .. } => {
             return Err(files.error("integrator.rr_depth", "must be at least 1"));
         }
         IntegratorDesc::Path { clamp: Some(clamp), .. } => {

@@ -215,12 +215,12 @@ pub enum IntegratorDesc {
         /// Largest number of segments from the camera; 1 shows only directly visible light. Default: 64.
         #[serde(default = "default_max_depth")]
         max_depth: u32,
-        /// Segments before Russian roulette may end a path. Default: 5.
-        #[serde(default = "default_rr_depth")]
-        rr_depth: u32,
-        /// When Russian roulette may end a path. Default: throughput.
-        #[serde(default, skip_serializing_if = "RouletteDesc::is_default")]
-        roulette: RouletteDesc,
+        /// Segments before Russian roulette by throughput may end a path. Default: 5.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        rr_depth: Option<u32>,
+        /// When Russian roulette may end a path. Default: auto, or throughput where `rr_depth` is given.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        roulette: Option<RouletteDesc>,
         /// How directions towards lights are found.
         #[serde(default)]
         strategy: StrategyDesc,
@@ -294,13 +294,13 @@ impl IntegratorDesc {
 }
 
 impl IntegratorDesc {
-    /// Path tracing by its depths, all else by default.
-    pub fn path(max_depth: u32, rr_depth: u32) -> Self {
+    /// Path tracing by its largest depth and where roulette begins, all else by default.
+    pub fn path(max_depth: u32, rr_depth: Option<u32>) -> Self {
         let strategy = StrategyDesc::default();
         Self::Path {
             max_depth,
             rr_depth,
-            roulette: RouletteDesc::default(),
+            roulette: None,
             strategy,
             clamp: None,
             regularize: None,
@@ -309,11 +309,18 @@ impl IntegratorDesc {
             caustics: CausticsDesc::default(),
         }
     }
+
+    /// When Russian roulette may end a path; `None` where there are no paths.
+    pub fn roulette(&self) -> Option<RouletteDesc> {
+        let Self::Path { roulette, rr_depth, .. } = *self else { return None };
+        let default = if rr_depth.is_some() { RouletteDesc::Throughput } else { RouletteDesc::Auto };
+        Some(roulette.unwrap_or(default))
+    }
 }
 
 impl Default for IntegratorDesc {
     fn default() -> Self {
-        Self::path(default_max_depth(), default_rr_depth())
+        Self::path(default_max_depth(), None)
     }
 }
 
@@ -330,12 +337,8 @@ fn default_max_depth() -> u32 {
     64
 }
 
-/// Segments before Russian roulette may end a path, where a scene does not say.
+/// Segments before Russian roulette by throughput may end a path, by default.
 pub const DEFAULT_RR_DEPTH: u32 = 5;
-
-fn default_rr_depth() -> u32 {
-    DEFAULT_RR_DEPTH
-}
 
 fn whitted_depth() -> u32 {
     8
@@ -369,11 +372,10 @@ pub enum CausticsDesc {
 }
 
 /// When Russian roulette may end a path. All give the same picture; they differ in noise and time.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RouletteDesc {
     /// From `rr_depth` segments on, by the throughput of the path.
-    #[default]
     Throughput,
     /// From the second scattering on, by what a path may add to its pixel and by what it costs, as a pilot of an eighth
     /// of a sample of each pixel finds both; shadow rays by what they carry. `rr_depth` is ignored.
@@ -438,12 +440,6 @@ impl<'de> Deserialize<'de> for GuidingDesc {
         }
 
         deserializer.deserialize_any(NameOrSwitch)
-    }
-}
-
-impl RouletteDesc {
-    fn is_default(&self) -> bool {
-        *self == Self::default()
     }
 }
 

@@ -30,7 +30,7 @@ use path::PathBuffers;
 pub use path::PathIntegrator;
 pub use regularization::Regularization;
 pub use render_context::RenderContext;
-pub use roulette::{Continuation, ContinuationGrid, Roulette};
+pub use roulette::{Continuation, ContinuationGrid, PilotRecords, Roulette};
 pub use shading::{adapt_shading_normal, terminator_factor};
 pub use strategy::Strategy;
 pub use surface::SurfaceAovs;
@@ -39,7 +39,7 @@ pub use world::World;
 
 use std::ops::Range;
 
-use crate::desc::{IntegratorDesc, RouletteDesc};
+use crate::desc::{DEFAULT_RR_DEPTH, IntegratorDesc, RouletteDesc};
 use crate::film::{LightAovRequest, SampleBatch};
 use crate::guiding::Guide;
 use crate::math::rows::{BATCH, Row};
@@ -274,14 +274,14 @@ pub trait Integrator: Send + Sync {
     ) {
     }
 
-    /// As [`render_batch`](Self::render_batch) for the radiance alone, and appends what paths found after each
-    /// scattering. Integrators without paths find nothing.
+    /// As [`render_batch`](Self::render_batch) for the radiance alone, and appends what paths found.
+    /// Integrators without paths find nothing.
     fn trace_pilot(
         &self,
         _pass: &PassContext,
         _samples: &CameraBatch,
         _workspace: &mut Workspace,
-        _continuations: &mut Vec<Continuation>,
+        _records: &mut PilotRecords,
     ) {
     }
 }
@@ -302,13 +302,15 @@ pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
     let Setup { sampler, surface_aovs, light_aovs } = setup;
     let view = |view| Box::new(DebugView { view, surface_aovs, light_aovs }) as Box<dyn Integrator>;
     match *desc {
-        IntegratorDesc::Path { max_depth, rr_depth, roulette, strategy, clamp, regularize, hide_emitters, .. } => {
+        IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp, regularize, hide_emitters, .. } => {
             Box::new(PathIntegrator {
                 max_depth,
-                roulette: match roulette {
-                    RouletteDesc::Off => Roulette::Off,
-                    RouletteDesc::Throughput => Roulette::Throughput { from: rr_depth },
-                    RouletteDesc::Auto => Roulette::Auto,
+                roulette: match desc.roulette() {
+                    Some(RouletteDesc::Auto) => Roulette::Auto,
+                    Some(RouletteDesc::Throughput) => {
+                        Roulette::Throughput { from: rr_depth.unwrap_or(DEFAULT_RR_DEPTH) }
+                    }
+                    Some(RouletteDesc::Off) | None => Roulette::Off,
                 },
                 strategy: strategy.into(),
                 clamp: clamp.unwrap_or(f32::INFINITY),

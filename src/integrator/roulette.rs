@@ -25,9 +25,9 @@ pub enum Roulette {
 /// make it much brighter at once.
 const LEAST_SHARE: f32 = 0.75;
 
-/// Shadow rays are traced with this many times the probability that a path with their contribution would go on with:
-/// direct light is stratified better than the variance of a sample suggests, and roulette disturbs that.
-const SHADOW_SCALE: f32 = 2.0;
+/// Shadow rays are traced with this many times the probability that a path worth as much would go on with: direct light
+/// is stratified better than the variance of a sample suggests, and roulette disturbs that.
+const SHADOW_SCALE: f32 = 3.0;
 
 /// With which probability paths go on.
 #[derive(Clone, Copy, Debug)]
@@ -76,6 +76,26 @@ pub struct Continuation {
     pub rays: f32,
 }
 
+/// What pilot paths found.
+#[derive(Clone, Debug, Default)]
+pub struct PilotRecords {
+    /// After each scattering.
+    pub continuations: Vec<Continuation>,
+    /// Shadow rays traced.
+    pub shadow_rays: u64,
+    /// Of these, those that reached their lights.
+    pub unoccluded: u64,
+}
+
+impl PilotRecords {
+    /// Appends those of other paths.
+    pub fn append(&mut self, other: &mut Self) {
+        self.continuations.append(&mut other.continuations);
+        self.shadow_rays += other.shadow_rays;
+        self.unoccluded += other.unoccluded;
+    }
+}
+
 /// Cells along the longest axis, by level; each level has the cells of the one before in parts.
 const LEVELS: [usize; 3] = [2, 8, 32];
 
@@ -100,6 +120,9 @@ pub struct ContinuationGrid {
     roots: Vec<f32>,
     /// What a ray that finds a radiance of 1 counts as: the factor that is in all roots.
     scale: f32,
+    /// [`SHADOW_SCALE`] times the root of the part of the shadow rays that reach their lights: the root mean square of
+    /// what they bring is that part of what they carry.
+    shadow_scale: f32,
 }
 
 /// Sums over the records of a cell.
@@ -126,20 +149,22 @@ impl CellSums {
 
 impl ContinuationGrid {
     /// From what pilot paths found; `None` if they found no light.
-    pub fn new(records: &[Continuation]) -> Option<Self> {
+    pub fn new(pilot: &PilotRecords) -> Option<Self> {
         let finite = |record: &&Continuation| record.p.is_finite() && record.radiance.is_finite();
-        let records: Vec<Continuation> = records.iter().filter(finite).copied().collect();
+        let records: Vec<Continuation> = pilot.continuations.iter().filter(finite).copied().collect();
         let mean = (records.iter().map(|record| f64::from(record.radiance)).sum::<f64>() / records.len() as f64) as f32;
         if !(mean > 0.0 && mean < f32::INFINITY) {
             return None;
         }
         let bounds = bounds_without_outliers(&records);
+        let unoccluded = if pilot.shadow_rays > 0 { pilot.unoccluded as f32 / pilot.shadow_rays as f32 } else { 1.0 };
         let size = bounds.size().max_element();
         let mut grid = Self {
             corner: bounds.min,
             cells_per_unit: if size > 0.0 && size < f32::INFINITY { LEVELS[2] as f32 / size } else { 0.0 },
             roots: Vec::new(),
             scale: 1.0,
+            shadow_scale: SHADOW_SCALE * unoccluded.sqrt(),
         };
         let mut all = CellSums::default();
         let mut levels = LEVELS.map(|side| vec![CellSums::default(); side * side * side * SIDES]);
@@ -169,7 +194,7 @@ impl ContinuationGrid {
     /// With which probability a shadow ray that carries `contribution` is traced.
     #[inline(always)]
     pub(super) fn shadow_ray_probability(&self, contribution: f32, rr_scale: f32) -> f32 {
-        let value = contribution * rr_scale * self.scale * SHADOW_SCALE;
+        let value = contribution * rr_scale * self.scale * self.shadow_scale;
         // NaN becomes 1: it must be seen in the sample.
         if value < 1.0 { value } else { 1.0 }
     }
@@ -235,6 +260,10 @@ mod tests {
         Continuation { p: Vec3::new(x, 0.0, 0.0), n, radiance, rays: 4.0 }
     }
 
+    fn pilot(continuations: &[Continuation]) -> PilotRecords {
+        PilotRecords { continuations: continuations.to_vec(), ..PilotRecords::default() }
+    }
+
     fn found(grid: &ContinuationGrid, x: f32, up: bool) -> f32 {
         let (mut points, mut normals) = (DVec3Rows([[0.0; BATCH]; 3]), Vec3Rows([[0.0; BATCH]; 3]));
         let (mut cos_side, mut roots) = ([1.0; BATCH], [0.0; BATCH]);
@@ -250,7 +279,8 @@ mod tests {
         let places = || (0..4000).map(|i| (i % 40) as f32 / 40.0);
         let bright = places().map(|x| record(x, true, if x < 0.5 { 3.0 } else { 1.0 }));
         let records: Vec<Continuation> = bright.chain(places().map(|x| record(x, false, 0.5))).collect();
-        let grid = ContinuationGrid::new(&records).unwrap();
+        let mut pilot = pilot(&records);
+        let grid = ContinuationGrid::new(&pilot).unwrap();
         // A cell has about 100 records, and 8 of the cell above.
         for (x, up, radiance) in [(0.1, true, 3.0), (0.9, true, 1.0), (0.1, false, 0.5), (0.9, false, 0.5)] {
             assert!((found(&grid, x, up) / (radiance / 2.0) - 1.0).abs() < 0.15, "{x} {up}: {}", found(&grid, x, up));
@@ -263,14 +293,20 @@ mod tests {
         assert_eq!(found(&scaled, 0.3, true), 2.0 * found(&grid, 0.3, true));
         let shadow_rays = |contribution| scaled.shadow_ray_probability(contribution, 0.5 / SHADOW_SCALE);
         assert_eq!([0.0, 0.25, 1.0, 3.0, f32::NAN].map(shadow_rays), [0.0, 0.25, 1.0, 1.0, 1.0]);
+        // Of which one in four reaches its light.
+        (pilot.shadow_rays, pilot.unoccluded) = (4000, 1000);
+        let occluded = ContinuationGrid::new(&pilot).unwrap();
+        assert_eq!(occluded.shadow_ray_probability(0.5, 1.0 / SHADOW_SCALE), 0.25);
     }
 
     #[test]
     fn without_light_there_is_no_grid() {
-        assert!(ContinuationGrid::new(&[]).is_none());
-        assert!(ContinuationGrid::new(&[record(0.0, true, 0.0)]).is_none());
-        assert!(ContinuationGrid::new(&[record(0.0, true, f32::NAN), record(0.0, true, f32::INFINITY)]).is_none());
-        assert!(ContinuationGrid::new(&[record(0.0, true, 1.0)]).is_some());
+        assert!(ContinuationGrid::new(&pilot(&[])).is_none());
+        assert!(ContinuationGrid::new(&pilot(&[record(0.0, true, 0.0)])).is_none());
+        assert!(
+            ContinuationGrid::new(&pilot(&[record(0.0, true, f32::NAN), record(0.0, true, f32::INFINITY)])).is_none()
+        );
+        assert!(ContinuationGrid::new(&pilot(&[record(0.0, true, 1.0)])).is_some());
     }
 
     #[test]

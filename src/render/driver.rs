@@ -98,8 +98,8 @@ impl Driver<'_> {
     fn run(&mut self, state: &mut RenderState) -> Stats {
         let mut stats = Stats::default();
         state.start(self.session);
-        let pilot = self.pool.install(|| self.renderer.prepare(&self.workspaces));
-        state.rays.add(&pilot);
+        // Its rays are of no sample: a resumed render and a shard trace it again.
+        self.pool.install(|| self.renderer.prepare(&self.workspaces));
         let all = state.film.tiles().len();
         let mut size =
             PassSize { samples: 1, tiles: if self.max_pass_time().is_some() { FIRST_TILES.min(all) } else { all } };

@@ -62,10 +62,10 @@ fn set_roulette(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Resul
         let IntegratorDesc::Path { roulette, rr_depth, .. } = integrator else {
             return Err(refused("roulette", ": only the integrator path plays Russian roulette"));
         };
-        *roulette = chosen;
+        *roulette = Some(chosen);
         // Scenes of other renderers disable roulette by a depth that no path reaches.
         if chosen == RouletteDesc::Throughput {
-            *rr_depth = DEFAULT_RR_DEPTH.min(*rr_depth);
+            *rr_depth = rr_depth.map(|depth| depth.min(DEFAULT_RR_DEPTH));
         }
     }
     Ok(())

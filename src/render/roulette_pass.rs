@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::TILE_SIZE;
 use super::tile_renderer::{TileRenderer, TileWorkspace};
-use crate::integrator::{Continuation, ContinuationGrid, RayCounts, dimensions};
+use crate::integrator::{ContinuationGrid, PilotRecords, RayCounts, dimensions};
 use crate::math::Vec2;
 use crate::math::rows::Row;
 use crate::sampling::PixelSeed;
@@ -100,13 +100,13 @@ impl PixelScales {
 #[derive(Default)]
 struct PilotSamples {
     values: Vec<[f32; 2]>,
-    continuations: Vec<Continuation>,
+    records: PilotRecords,
     counts: RayCounts,
 }
 
 impl RouletteEstimates {
-    /// Traces the pilot of a picture; `None` if it is black. Also the rays traced.
-    pub fn new(renderer: &TileRenderer, workspaces: &[Mutex<TileWorkspace>]) -> (Option<Self>, RayCounts) {
+    /// Traces the pilot of a picture; `None` if it is black.
+    pub fn new(renderer: &TileRenderer, workspaces: &[Mutex<TileWorkspace>]) -> Option<Self> {
         let grid = PilotGrid::new(renderer.view);
         let chunk = TILE_SIZE * TILE_SIZE / (2 * GROUP);
         let parts: Vec<PilotSamples> = (0..grid.count().div_ceil(chunk))
@@ -118,17 +118,16 @@ impl RouletteEstimates {
             })
             .collect();
         let mut all = PilotSamples::default();
-        for part in parts {
+        for mut part in parts {
             all.values.extend(part.values);
-            all.continuations.extend(part.continuations);
+            all.records.append(&mut part.records);
             all.counts.add(&part.counts);
         }
-        let counts = all.counts;
-        (Self::from_samples(grid, &all), counts)
+        Self::from_samples(grid, &all)
     }
 
     fn from_samples(grid: PilotGrid, samples: &PilotSamples) -> Option<Self> {
-        let mut continuations = ContinuationGrid::new(&samples.continuations)?;
+        let mut continuations = ContinuationGrid::new(&samples.records)?;
         let count = samples.values.len() as f64;
         let values = blurred(&cell_means(grid, &samples.values), grid.size[0] / CELL_SIDE);
         let mut positive: Vec<f32> = values.iter().copied().filter(|&value| value > 0.0).collect();
@@ -174,7 +173,7 @@ fn trace(
         grid.point(i, [u[0], u[1]])
     };
     let mut samples = PilotSamples::default();
-    renderer.trace_pilot(&mut ids, point, workspace, &mut samples.continuations);
+    renderer.trace_pilot(&mut ids, point, workspace, &mut samples.records);
     let value = |slot: usize| {
         let value = workspace.radiance(slot).into_iter().fold(0.0, f64::max) as f32;
         if value < f32::INFINITY { value } else { 0.0 }

@@ -321,7 +321,7 @@ fn outputs(desc: &SceneDesc, overrides: &Overrides, integrator: &IntegratorDesc)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::desc::{RouletteDesc, SamplerKindDesc};
+    use crate::desc::SamplerKindDesc;
 
     fn scene(text: &str) -> SceneDesc {
         serde_json::from_str(text).unwrap()
@@ -352,7 +352,7 @@ mod tests {
         assert_eq!((s.sampler, s.spp, s.seed), (SamplerKind::Independent, 16, 3));
         assert!(matches!(
             s.integrator,
-            IntegratorDesc::Path { max_depth: 9, rr_depth: 3, strategy: StrategyDesc::Mis, clamp: None, .. }
+            IntegratorDesc::Path { max_depth: 9, rr_depth: Some(3), strategy: StrategyDesc::Mis, clamp: None, .. }
         ));
         assert_eq!(s.layers, [LayerKind::N].into_iter().collect());
         assert_eq!((s.accel, s.time_limit, s.outputs.len()), (AccelKind::Auto, None, 2));
@@ -393,13 +393,13 @@ mod tests {
         // The same integrator: parameters that are not changed stay the scene's.
         let changed = IntegratorDesc::Path {
             max_depth: 4,
-            rr_depth: 3,
+            rr_depth: Some(3),
             strategy: StrategyDesc::Light,
             clamp: Some(2.5),
             regularize: None,
             hide_emitters: false,
             guiding: GuidingDesc::default(),
-            roulette: RouletteDesc::Throughput,
+            roulette: None,
             caustics: CausticsDesc::Paths,
         };
         assert_eq!(s.integrator, changed);

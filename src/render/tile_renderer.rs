@@ -14,7 +14,7 @@ use crate::film::{
 };
 use crate::guiding::Guide;
 use crate::integrator::{
-    self, CameraBatch, CameraBlock, Continuation, Guidance, Integrator, PassContext, RayCounts, RenderContext, Setup,
+    self, CameraBatch, CameraBlock, Guidance, Integrator, PassContext, PilotRecords, RayCounts, RenderContext, Setup,
     SurfaceAovs, Workspace, World, dimensions,
 };
 use crate::math::Vec2;
@@ -124,7 +124,7 @@ impl<'a> TileRenderer<'a> {
             caustics: settings.gathers_photons().then(|| CausticPass::new(scene, accel, settings)).flatten(),
             guide: settings.guide.as_ref().and_then(|guide| guide.of_scene(accel.bounds())),
             roulette: None,
-            needs_pilot: matches!(settings.integrator, IntegratorDesc::Path { roulette: RouletteDesc::Auto, .. }),
+            needs_pilot: settings.integrator.roulette() == Some(RouletteDesc::Auto),
         }
     }
 
@@ -133,14 +133,11 @@ impl<'a> TileRenderer<'a> {
         PassContext { world: &self.world, render: self.context, guidance, caustics: None, continuations }
     }
 
-    /// Traces the pilot of the picture, if roulette needs one; the result is the rays traced.
-    pub fn prepare(&mut self, workspaces: &[Mutex<TileWorkspace>]) -> RayCounts {
-        if !self.needs_pilot {
-            return RayCounts::default();
+    /// Traces the pilot of the picture, if roulette needs one.
+    pub fn prepare(&mut self, workspaces: &[Mutex<TileWorkspace>]) {
+        if self.needs_pilot {
+            self.roulette = RouletteEstimates::new(self, workspaces);
         }
-        let (roulette, counts) = RouletteEstimates::new(self, workspaces);
-        self.roulette = roulette;
-        counts
     }
 
     /// Traces samples of any seeds through points of the film, at most as many as a tile has pixels.
@@ -149,7 +146,7 @@ impl<'a> TileRenderer<'a> {
         ids: &mut impl Iterator<Item = (u32, PixelSeed, u32)>,
         point: impl Fn((u32, PixelSeed)) -> Vec2,
         workspace: &mut TileWorkspace,
-        continuations: &mut Vec<Continuation>,
+        records: &mut PilotRecords,
     ) {
         let TileWorkspace { samples, film, numbers, integrator, .. } = workspace;
         samples.clear();
@@ -168,7 +165,7 @@ impl<'a> TileRenderer<'a> {
             self.camera_rays(count, film, numbers, block);
             samples.extend(count);
         }
-        self.integrator.trace_pilot(&self.pass(Guidance::default()), samples, integrator, continuations);
+        self.integrator.trace_pilot(&self.pass(Guidance::default()), samples, integrator, records);
     }
 
     /// Traces the photons of a sample's epoch, unless they are there; the result is the rays traced.

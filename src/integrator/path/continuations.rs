@@ -4,7 +4,7 @@ use super::block::{Vertices, spawn};
 use super::radiance::Output;
 use super::wave::PathRows;
 use crate::color::Rgb;
-use crate::integrator::Continuation;
+use crate::integrator::{Continuation, PilotRecords};
 use crate::math::Vec3;
 
 /// Rays of a vertex beyond the recorded one: the ray that goes on and the shadow ray.
@@ -28,6 +28,8 @@ pub(super) struct ContinuationRecorder {
     scattered: Vec<ScatteredPath>,
     /// How many of them have their `radiance_before`.
     marked: usize,
+    shadow_rays: u64,
+    unoccluded: u64,
 }
 
 impl ContinuationRecorder {
@@ -53,6 +55,19 @@ impl ContinuationRecorder {
         }
     }
 
+    /// Counts the shadow rays of a block's vertices.
+    pub fn count_shadow_rays(&mut self, vertices: &Vertices) {
+        if self.is_enabled {
+            let status = &vertices.direct.status[..vertices.count];
+            self.shadow_rays += status.iter().filter(|&&status| status == spawn::SPAWNED).count() as u64;
+        }
+    }
+
+    /// Counts shadow rays that reached their lights.
+    pub fn count_unoccluded(&mut self, count: usize) {
+        self.unoccluded += count as u64;
+    }
+
     /// All that is added to the samples from here on came by the rays that were recorded last.
     pub fn mark_radiance(&mut self, out: &Output) {
         for path in &mut self.scattered[self.marked..] {
@@ -62,15 +77,17 @@ impl ContinuationRecorder {
     }
 
     /// Appends what the wave of `samples` samples has found, and records no longer.
-    pub fn finish(&mut self, out: &Output, samples: usize, continuations: &mut Vec<Continuation>) {
+    pub fn finish(&mut self, out: &Output, samples: usize, records: &mut PilotRecords) {
         let mut later = vec![0.0; samples];
         for path in self.scattered.iter().rev() {
             let later = &mut later[path.slot as usize];
             *later += RAYS_OF_VERTEX;
             let found = out.batch.pixels[path.slot as usize].radiance - path.radiance_before;
             let radiance = found.max_channel().max(0.0) / path.throughput;
-            continuations.push(Continuation { p: path.p, n: path.n, radiance, rays: *later });
+            records.continuations.push(Continuation { p: path.p, n: path.n, radiance, rays: *later });
         }
+        records.shadow_rays += self.shadow_rays;
+        records.unoccluded += self.unoccluded;
         *self = Self::default();
     }
 }

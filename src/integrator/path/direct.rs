@@ -42,6 +42,7 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
     if let Some(grid) = context.pass.continuations {
         vectorize!(play_roulette(grid, rows, direct, u_bsdf, count));
     }
+    wave.continuations.count_shadow_rays(vertices);
     if context.scene.features.shading_normals {
         wave.counts.shadow += offset_below_facets(context, vertices, terminator_rays);
     }

@@ -31,7 +31,7 @@ mod wave;
 use super::cancel;
 use super::regularization::Regularization;
 use super::{
-    CameraBatch, CausticCasters, Continuation, Guidance, Integrator, PassContext, Photon, PhotonRange, Roulette,
+    CameraBatch, CausticCasters, Guidance, Integrator, PassContext, Photon, PhotonRange, PilotRecords, Roulette,
     SecondMoments, Strategy, SurfaceAovs, Workspace, World, dimensions,
 };
 use crate::color::Rgb;
@@ -130,7 +130,7 @@ impl Integrator for PathIntegrator {
         pass: &PassContext,
         samples: &CameraBatch,
         workspace: &mut Workspace,
-        continuations: &mut Vec<Continuation>,
+        records: &mut PilotRecords,
     ) {
         let pilot = Self {
             roulette: Roulette::Throughput { from: PILOT_RR_DEPTH },
@@ -142,7 +142,7 @@ impl Integrator for PathIntegrator {
         workspace.paths.0.continuations.enable();
         pilot.render_batch(&pass, samples, workspace);
         let Workspace { out, paths: PathBuffers(wave), .. } = workspace;
-        wave.continuations.finish(&Output { batch: out }, samples.len(), continuations);
+        wave.continuations.finish(&Output { batch: out }, samples.len(), records);
     }
 }
 

@@ -40,10 +40,12 @@ pub(super) fn shadow(context: &Context, wave: &mut Wave, out: &mut Output, count
     for (block, rays) in shadows.rays.iter().enumerate().take(shadows.count.div_ceil(BATCH)) {
         let first = block * BATCH;
         let count = BATCH.min(shadows.count - first);
-        // Media have been asked already.
+        // In media they have been traced already.
         if !context.scene.features.participating_media {
             context.world.accel.occluded_rows(rays, count, &mut occluded, coherence);
         }
+        let blocked = occluded[..count].iter().filter(|&&occluded| occluded).count();
+        wave.continuations.count_unoccluded(count - blocked);
         for (i, _) in (first..).zip(&occluded[..count]).filter(|(_, occluded)| !**occluded) {
             let rows = &shadows.rows[block];
             let (slot, light) = (rows.slot[i % BATCH], rows.contribution.get(i % BATCH));

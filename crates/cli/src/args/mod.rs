@@ -268,7 +268,8 @@ pub struct RenderArgs {
     ///
     /// auto: by the expected contribution of a path to its pixel and the expected cost, both estimated from a pilot of
     /// 1/8 sample per pixel; throughput: by path throughput, from depth 5 or the scene's rr_depth if that is smaller;
-    /// off: no roulette. All are unbiased. Default: the scene's setting
+    /// off: no roulette. All are unbiased. Default: the scene's setting; without one, throughput if the scene
+    /// has rr_depth, otherwise auto
     #[arg(long, value_name = "NAME", value_parser = names::plain::<RouletteDesc>(), help_heading = "Algorithm")]
     pub roulette: Option<RouletteDesc>,
     /// Clamp the contribution of a single path of indirect light: less noise, but biased (too dark). Off by default;

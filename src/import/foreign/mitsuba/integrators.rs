@@ -11,7 +11,7 @@ const UNLIMITED: u32 = 65_536;
 
 /// What a scene without an integrator is rendered with.
 pub(super) fn unlimited_path() -> IntegratorDesc {
-    IntegratorDesc::path(UNLIMITED, 5)
+    IntegratorDesc::path(UNLIMITED, None)
 }
 
 impl Reader<'_> {
@@ -61,7 +61,7 @@ impl Reader<'_> {
                 );
             }
             "direct" | "emission_direct" => {
-                self.draft.desc.integrator = IntegratorDesc::path(2, 5);
+                self.draft.desc.integrator = IntegratorDesc::path(2, None);
                 for name in ["shading_samples", "emitter_samples", "bsdf_samples"] {
                     if element.take(name).is_some() {
                         element.approximated(name, "one sample of each, more samples per pixel have the same mean");
@@ -93,6 +93,6 @@ fn path(element: &mut Element) -> Result<IntegratorDesc> {
     if max_depth == 0 {
         element.approximated("max_depth", "1 in place of 0: what emits light is seen");
     }
-    let rr_depth = element.count("rr_depth", 1)?.unwrap_or(5);
+    let rr_depth = element.count("rr_depth", 1)?;
     Ok(IntegratorDesc::path(max_depth.max(1), rr_depth))
 }

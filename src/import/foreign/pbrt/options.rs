@@ -183,6 +183,6 @@ pub fn set_integrator(draft: &mut Draft, integrator: Option<&Typed>) -> Result<(
     }
     // pbrt counts bounces, we count segments: one bounce is the light that arrives over two.
     let max_depth = u32::try_from(max_depth.max(0)).unwrap_or(u32::MAX).saturating_add(1);
-    draft.desc.integrator = IntegratorDesc::path(max_depth, 5);
+    draft.desc.integrator = IntegratorDesc::path(max_depth, None);
     Ok(())
 }

@@ -135,11 +135,11 @@ fn samplers_and_integrators() {
         IntegratorDesc::Path { max_depth, rr_depth, .. } => (max_depth, rr_depth),
         other => panic!("{other:?}"),
     };
-    assert_eq!(integrator(""), (65_536, 5));
+    assert_eq!(integrator(""), (65_536, None));
     assert_eq!(integrator(r#"<integrator type="path"><integer name="max_depth" value="-1"/></integrator>"#).0, 65_536);
     let inner = r#"<integrator type="moment"><integrator type="path"><integer name="max_depth" value="7"/>
         <integer name="rr_depth" value="9"/></integrator></integrator>"#;
-    assert_eq!(integrator(inner), (7, 9));
+    assert_eq!(integrator(inner), (7, Some(9)));
     assert_eq!(integrator(r#"<integrator type="direct"/>"#).0, 2);
     let hidden = r#"<integrator type="KIND"><boolean name="hide_emitters" value="true"/></integrator>"#;
     assert!(notes(&hidden.replace("KIND", "path")).is_empty());
