@@ -8,7 +8,7 @@ use std::sync::Arc;
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::film::Identities;
-use crate::geometry::{Geometry, SurfaceInteraction};
+use crate::geometry::{AlphaMasks, Geometry, SurfaceInteraction};
 use crate::id::{LightId, MaterialId, MediumId, NormalPerturbationId, PrimId, ShapeId};
 use crate::light::{LightGroups, LightSet};
 use crate::material::Material;
@@ -103,6 +103,9 @@ impl SceneFeatures {
 pub struct Scene {
     /// All shapes; accelerators are over them.
     pub geometry: Arc<Geometry>,
+    /// Holes in surfaces of participating media. Accelerators find hits in these holes too: paths change their medium
+    /// there.
+    pub boundary_masks: AlphaMasks,
     /// How each shape looks, by [`ShapeId`].
     pub surfaces: Vec<Surface>,
     /// Materials, by [`MaterialId`].

@@ -170,6 +170,24 @@ const ABSORPTION: [f64; 3] = [0.2, 0.7, 1.5];
 const SCATTERING: [f64; 3] = [0.9, 0.3, 0.1];
 
 #[test]
+fn paths_change_their_medium_in_holes_of_its_boundary() {
+    let picture = |ior: f64, opacity: f64| {
+        let medium = json!({ "absorption": ABSORPTION, "scattering": SCATTERING, "emission": 0.3 });
+        let mut scene = slab(medium);
+        scene["integrator"]["max_depth"] = json!(8);
+        scene["lights"] = json!([{ "type": "point", "position": [0, 0, 4], "intensity": 20 }]);
+        scene["materials"]["m"]["ior"] = json!(ior);
+        scene["shapes"][0]["opacity"] = json!(opacity);
+        render(&scene)
+    };
+    let plain = picture(1.0, 1.0);
+    assert!(pixels(&plain).all(|pixel| pixel[0] > 0.1));
+    assert!(picture(1.0, 0.5) == plain);
+    // Glass that is all hole refracts nothing.
+    assert!(picture(1.5, 0.0) == plain);
+}
+
+#[test]
 fn what_passes_straight_is_beer_and_lamberts() {
     let scene = slab(json!({ "absorption": ABSORPTION }));
     let image = render(&scene);

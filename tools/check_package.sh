@@ -44,7 +44,7 @@ cd "$aside"
 cargo "${1:-check}" --offline --workspace --target-dir "$target"
 
 export RUSTDOCFLAGS="-D warnings"
-document() { cargo doc --offline --no-deps --lib --document-private-items --target-dir "$target" "${@/#/--package=}"; }
-document steradian-bench
-# docs.rs has a C compiler, but neither Embree nor libclang: wrong paths do no harm.
-DOCS_RS=1 EMBREE_DIR=/nonexistent LIBCLANG_PATH=/nonexistent document steradian
+document() { cargo doc --offline --no-deps --lib --target-dir "$target" "$@"; }
+document --document-private-items --package steradian --package steradian-bench
+# As docs.rs shows it, which has a C compiler, but neither Embree nor libclang: wrong paths do no harm.
+DOCS_RS=1 EMBREE_DIR=/nonexistent LIBCLANG_PATH=/nonexistent document --package steradian

@@ -281,7 +281,8 @@ impl Builder {
                 perturbation.rescale(self.space.scale());
             }
         }
-        self.geometry.cutouts = opacity::cutouts(&self.geometry.shapes, &self.opacities, &self.materials.textures);
+        let boundary_masks = self.alpha_masks(true);
+        self.geometry.cutouts = self.alpha_masks(false);
         let in_use = self.media_in_use();
         let light_groups = self.lights.groups();
         let lights = LightSet::new(self.lights.lights, &self.geometry);
@@ -315,6 +316,7 @@ impl Builder {
         features.set_materials(&materials, &self.materials.textures.textures);
         Ok(Scene {
             geometry: Arc::new(self.geometry),
+            boundary_masks,
             surfaces: self.surfaces,
             materials,
             plain_materials,

@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use super::Builder;
-use super::textures::{TextureTable, TextureUse};
+use super::textures::TextureUse;
 use crate::color::Rgb;
 use crate::desc::{OpacityDesc, ShapeCommon};
 use crate::error::Result;
-use crate::geometry::{AlphaMasks, Shape};
+use crate::geometry::AlphaMasks;
 use crate::id::TextureId;
+use crate::medium::Medium;
 use crate::opacity::Opacity;
 use crate::texture::{Bitmap, Channel, Texture};
 
@@ -50,13 +51,20 @@ impl Builder {
             }
         })
     }
-}
 
-/// The holes of shapes with these opacities.
-pub(super) fn cutouts(shapes: &[Shape], opacities: &[Option<TextureId>], textures: &TextureTable) -> AlphaMasks {
-    if opacities.iter().all(Option::is_none) {
-        return AlphaMasks::default();
+    /// The holes of surfaces of participating media, or of all others.
+    pub(super) fn alpha_masks(&self, of_participating_media: bool) -> AlphaMasks {
+        let (media, textures) = (&self.materials.media, &self.materials.textures);
+        let is_chosen = |i: usize| {
+            let medium = self.surfaces[i].medium.map(|id| media.get(id));
+            medium.is_some_and(Medium::is_participating) == of_participating_media
+        };
+        let of_shape =
+            |(i, id): (usize, &Option<TextureId>)| id.filter(|_| is_chosen(i)).map(|id| textures.get(id).clone());
+        let by_shape: Vec<Option<Texture>> = self.opacities.iter().enumerate().map(of_shape).collect();
+        if by_shape.iter().all(Option::is_none) {
+            return AlphaMasks::default();
+        }
+        AlphaMasks::new(Arc::new(Opacity::new(&self.geometry.shapes, by_shape)))
     }
-    let by_shape = opacities.iter().map(|id| id.map(|id| textures.get(id).clone())).collect();
-    AlphaMasks::new(Arc::new(Opacity::new(shapes, by_shape)))
 }

@@ -130,7 +130,7 @@ fn features(scene: &Scene) -> Vec<&'static str> {
         (f.instances, "instances"),
         (f.textures, "textures"),
         (f.normal_perturbations, "normal or bump maps"),
-        (!scene.geometry.cutouts.is_empty(), "holes"),
+        (!scene.geometry.cutouts.is_empty() || !scene.boundary_masks.is_empty(), "holes"),
         (f.delta_materials, "mirror or glass"),
         (f.media, "media"),
         (f.participating_media, "participating media"),

@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use super::{Detail, Hit, Shape};
+use super::{Detail, Geometry, Hit, Shape};
 use crate::id::ShapeId;
 use crate::math::Ray;
 use crate::math::random::mix_32;
@@ -46,6 +46,18 @@ impl AlphaMasks {
     #[inline(always)]
     pub fn key(&self, ray: &Ray) -> u32 {
         if self.is_empty() { 0 } else { ray_key(ray) }
+    }
+
+    /// Whether a hit of a world-space ray with a shape of `geometry` counts, by these masks.
+    pub fn counts_in(&self, geometry: &Geometry, ray: &Ray, hit: &Hit) -> bool {
+        if self.is_empty() {
+            return true;
+        }
+        let key = self.key(ray);
+        if hit.instance == Hit::NO_INSTANCE {
+            return self.counts(&geometry.shapes, key, ray, hit);
+        }
+        self.counts(&geometry.shapes, key, &geometry.instance(hit.instance).object_ray(ray), hit)
     }
 
     /// Whether a hit of the ray with this key counts. `ray` is in the space the shapes are placed in; `hit` names its

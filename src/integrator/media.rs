@@ -73,7 +73,7 @@ pub(super) fn enclosed(scene: &Scene) -> Vec<bool> {
         !medium.scattering.is_black()
             && media.surroundings() != Some(medium)
             && others.all(|other| other.ior.iter().zip(medium.ior).all(|(a, b)| *a != b))
-            && !(0..geometry.shapes.len()).map(ShapeId::new).any(|id| is_of(id) && geometry.cutouts.has_holes(id))
+            && !(0..geometry.shapes.len()).map(ShapeId::new).any(|id| is_of(id) && scene.boundary_masks.has_holes(id))
             && !scene.lights.is_any_within(geometry, &bounds_of(scene, is_of))
     };
     media.iter().map(is_enclosed).collect()
@@ -100,19 +100,24 @@ pub(super) fn crosses(at: &SurfaceInteraction, from: Vec3, to: Vec3) -> bool {
 }
 
 impl World<'_> {
-    /// The medium's boundary that a ray meets at a surface; `None` where the surface or this point of it is none.
+    /// The medium's boundary that a ray meets at the surface of its hit; `None` where the surface or this point of it
+    /// is none. Light passes holes without refraction.
     pub(super) fn boundary(
         &self,
+        ray: &Ray,
+        hit: Option<Hit>,
         at: &SurfaceInteraction,
-        direction: Vec3,
         state: &MediaState,
     ) -> Option<MediumBoundary> {
         let medium = self.scene.surface(at.shape).medium?;
-        if !self.scene.met_material(at, direction).flags().transmits() {
+        let masks = &self.scene.boundary_masks;
+        let is_hole = hit.is_some_and(|hit| !masks.counts_in(&self.scene.geometry, ray, &hit));
+        if !is_hole && !self.scene.met_material(at, ray.direction).flags().transmits() {
             return None;
         }
-        let sides = BoundaryMedia::new(state.current, medium, direction.dot(at.n_g) < 0.0);
-        Some(MediumBoundary { sides, ior: self.scene.media.relative_ior(&sides, state.channel) })
+        let sides = BoundaryMedia::new(state.current, medium, ray.direction.dot(at.n_g) < 0.0);
+        let ior = if is_hole { RelativeIor::Same(1.0) } else { self.scene.media.relative_ior(&sides, state.channel) };
+        Some(MediumBoundary { sides, ior })
     }
 
     /// The scattering at a boundary between media, if a path has arrived at one.
@@ -161,7 +166,7 @@ impl World<'_> {
             let at = self.resolve(ray, hit);
             let way = Ray { t_max: at.as_ref().map_or(f32::INFINITY, |at| at.t), ..*ray };
             transmittance *= self.transmittance(&state.current, &way);
-            let boundary = at.as_ref().and_then(|at| self.boundary(at, ray.direction, state));
+            let boundary = at.as_ref().and_then(|at| self.boundary(ray, hit, at, state));
             let ior = boundary.as_ref().map(|boundary| boundary.ior);
             let (Some(at), Some(boundary), true) =
                 (at, boundary, ior.is_some_and(|ior| ior.is_one()) && passed < MAX_SURFACES)

@@ -133,7 +133,7 @@ impl World<'_> {
                     return MediumPath { hit, weight: track.weight(), emitted, passed, ior: None, first };
                 }
             }
-            let boundary = at.as_ref().and_then(|at| self.boundary(at, ray.direction, state));
+            let boundary = at.as_ref().and_then(|at| self.boundary(ray, hit, at, state));
             let ior = boundary.as_ref().map(|boundary| boundary.ior);
             let (Some(at), Some(boundary), true) =
                 (at, boundary, ior.is_some_and(|ior| ior.is_one()) && passed < MAX_SURFACES)
@@ -159,12 +159,13 @@ impl World<'_> {
         let mut ray = *ray;
         let mut left = Rgb::WHITE;
         for passed in 0..=MAX_SURFACES {
-            let at = self.closest(&ray);
+            let hit = self.accel.intersect(&ray);
+            let at = self.resolve(&ray, hit);
             let way = Ray { t_max: at.as_ref().map_or(ray.t_max, |at| at.t), ..ray };
             left *= self.scene.media.transmittance(&state.current, &way, || Rng::new(random.bits()));
             let traced = u64::from(passed) + 1;
             let Some(at) = at.filter(|_| !left.is_black()) else { return (left, traced) };
-            let boundary = self.boundary(&at, ray.direction, &state).filter(|boundary| boundary.ior.is_one());
+            let boundary = self.boundary(&ray, hit, &at, &state).filter(|boundary| boundary.ior.is_one());
             let Some(boundary) = boundary else { return (Rgb::BLACK, traced) };
             state.current = boundary.sides.beyond(ray.direction.dot(at.n_g) < 0.0);
             ray = match end {
