@@ -20,7 +20,7 @@ pub trait AlphaMask: Debug + Send + Sync {
     fn alpha(&self, shape: &Shape, ray: &Ray, hit: &Hit) -> f32;
 }
 
-/// [`AlphaMask`] of the shapes of a [`Geometry`](super::Geometry), or of none.
+/// [`AlphaMask`] of the shapes of a [`Geometry`], or of none.
 #[derive(Clone, Debug, Default)]
 pub struct AlphaMasks(Option<Arc<dyn AlphaMask>>);
 
