@@ -120,8 +120,8 @@ pub struct ContinuationGrid {
     roots: Vec<f32>,
     /// What a ray that finds a radiance of 1 counts as: the factor that is in all roots.
     scale: f32,
-    /// [`SHADOW_SCALE`] times the root of the part of the shadow rays that reach their lights: the root mean square of
-    /// what they bring is that part of what they carry.
+    /// [`SHADOW_SCALE`] times the root of the part of the shadow rays that reach their lights, which is the root mean
+    /// square of what shadow rays bring over what they carry.
     shadow_scale: f32,
 }
 

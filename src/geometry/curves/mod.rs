@@ -252,7 +252,7 @@ impl Curves {
 
     /// The strand that a segment is of.
     fn strand(&self, prim: PrimId) -> usize {
-        // Where all strands have as many segments it is this one.
+        // The strand, if all have the same number of segments.
         let guess = (u64::from(prim.0) * self.strand_count() as u64 / self.prim_count() as u64) as usize;
         if self.strands[guess] <= prim.0 && prim.0 < self.strands[guess + 1] {
             return guess;
