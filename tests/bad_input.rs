@@ -134,6 +134,8 @@ fn settings_out_of_range() {
         ("sampler.spp", json!(0), "sampler.spp", "1"),
         ("integrator.max_depth", json!(0), "integrator.max_depth", "1"),
         ("integrator.rr_depth", json!(0), "integrator.rr_depth", "1"),
+        ("integrator.light_samples", json!(0), "integrator.light_samples", "1 to 64"),
+        ("integrator.light_samples", json!(65), "integrator.light_samples", "65"),
         ("integrator", json!({ "type": "whitted", "max_depth": 0 }), "integrator.max_depth", "0"),
         ("integrator", json!({ "type": "whitted", "ambient": [0, -1, 0] }), "integrator.ambient", "-1"),
         ("integrator", json!({ "type": "ambient_occlusion", "distance": 0 }), "integrator.distance", "0"),

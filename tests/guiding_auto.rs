@@ -16,12 +16,17 @@ use crate::guiding::room_with_shaft;
 use crate::util::render::{assert_blocks_agree, block_means};
 
 /// The fewest samples that a pilot is traced for.
-const SPP: u32 = 64;
+const SPP: u32 = 128;
 
-/// Where most light comes by few ways: the pilot finds a ratio of variances between 2.4 and 3.1, by seed.
+/// Pixels along the sides of pictures: just enough for a pilot.
+const SIDE: u32 = 96;
+
+/// Where most light comes by few ways.
 fn hard() -> Value {
     let mut scene = room_with_shaft(0.5);
     scene["integrator"]["max_depth"] = json!(4);
+    scene["film"]["width"] = json!(SIDE);
+    scene["film"]["height"] = json!(SIDE);
     scene
 }
 
@@ -29,7 +34,7 @@ fn hard() -> Value {
 fn easy() -> Value {
     json!({
         "camera": { "position": [0, 1, 4], "look_at": [0, 0, 0] },
-        "film": { "width": 128, "height": 128, "filter": { "type": "box" } },
+        "film": { "width": SIDE, "height": SIDE, "filter": { "type": "box" } },
         "integrator": { "type": "path" },
         "shapes": [
             { "type": "sphere", "radius": 1 },
@@ -138,14 +143,15 @@ fn a_guided_picture_has_the_same_mean() {
         (first..first + 8).map(|seed| block_means(&picture(seed))).collect()
     };
     let [mut guided, mut plain] = [blocks(GuidingDesc::Auto, 1), blocks(GuidingDesc::Off, 101)];
-    // The outside of the shaft is black in all of them.
-    let is_lit: Vec<bool> =
-        (0..plain[0].len()).map(|block| guided.iter().chain(&plain).any(|means| means[block] > 0.0)).collect();
+    // What is nearly black is lit in few of them.
+    let sum = |block: usize| guided.iter().chain(&plain).map(|means| means[block]).sum::<f64>();
+    let largest = (0..plain[0].len()).map(sum).fold(0.0, f64::max);
+    let is_lit: Vec<bool> = (0..plain[0].len()).map(|block| sum(block) > 0.01 * largest).collect();
     for means in guided.iter_mut().chain(&mut plain) {
         let mut lit = is_lit.iter();
         means.retain(|_| lit.next().is_some_and(|lit| *lit));
     }
-    assert!(plain[0].len() > 200, "{}", plain[0].len());
+    assert!(plain[0].len() > 30, "{}", plain[0].len());
     assert_blocks_agree(&guided, &plain, "guided against not");
 }
 
@@ -180,6 +186,8 @@ fn pilots_are_traced_only_where_they_can_pay() {
     assert!(has_pilot(&same, auto()));
     assert!(!has_pilot(&same, overrides(GuidingDesc::Auto, SPP - 1)));
     assert!(!has_pilot(&same, overrides(GuidingDesc::On, SPP)));
+    // It is the default.
+    assert!(has_pilot(&same, Overrides { guiding: None, ..auto() }));
     assert!(!has_pilot(&same, Overrides { target_error: Some(0.01), ..auto() }));
     assert!(!has_pilot(&same, Overrides { size: Some([64, 64]), ..auto() }));
     assert!(!has_pilot(&same, Overrides { max_depth: Some(2), ..auto() }));
@@ -188,15 +196,16 @@ fn pilots_are_traced_only_where_they_can_pay() {
     assert!(!has_pilot(&|scene| scene["integrator"] = json!({ "type": "whitted" }), auto()));
 }
 
+/// Those before have the same numbers with and without a pilot.
 #[test]
-fn samples_that_may_be_guided_are_not_replayed() {
-    let kit = kit(&hard(), GuidingDesc::Auto, SPP);
-    let scene = &kit.prepared.scene;
-    let accel = accel::build(AccelKind::EMBREE, &scene.geometry, 1).unwrap();
-    let replay = |sample| render::replay(scene, &*accel, &kit.prepared.settings, [3, 5], sample);
-    assert!(replay(3).is_ok());
-    let error = replay(4).unwrap_err().to_string();
-    assert!(error.contains("`pixel`") && error.contains("`guiding` off"), "{error}");
+fn samples_are_replayed_without_guiding() {
+    let [auto, off] = [GuidingDesc::Auto, GuidingDesc::Off].map(|guiding| {
+        let kit = kit(&hard(), guiding, SPP);
+        let scene = &kit.prepared.scene;
+        let accel = accel::build(AccelKind::EMBREE, &scene.geometry, 1).unwrap();
+        [3, 100].map(|sample| render::replay(scene, &*accel, &kit.prepared.settings, [3, 5], sample).unwrap())
+    });
+    assert!(auto == off);
 }
 
 /// A crop is decided on by its own samples.
@@ -204,10 +213,10 @@ fn samples_that_may_be_guided_are_not_replayed() {
 fn crops_have_pilots_of_their_own() {
     let crop = |threads| {
         let overrides =
-            Overrides { crop: Some([20, 31, 97, 91]), threads: Some(threads), ..overrides(GuidingDesc::Auto, 2 * SPP) };
+            Overrides { crop: Some([10, 21, 71, 67]), threads: Some(threads), ..overrides(GuidingDesc::Auto, 2 * SPP) };
         picture(&hard(), &overrides)
     };
     let image = crop(2);
-    assert_eq!(image.crop.area(), 97 * 91);
+    assert_eq!(image.crop.area(), 71 * 67);
     assert!(image == crop(1));
 }

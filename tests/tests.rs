@@ -83,6 +83,8 @@ mod identities;
 mod interrupted;
 /// The parts of the light, motion, and what denoisers need.
 mod layers;
+/// Several lights sampled at the first vertex of a path.
+mod light_samples;
 /// Integrators against closed forms, strategies against each other.
 mod light_transport;
 /// Measured and textured lights, lamps in objects, groups, clamping.

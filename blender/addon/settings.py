@@ -62,7 +62,15 @@ class Settings(bpy.types.PropertyGroup):
             ("photons", "Photons", "Also by photons from the lights: little noise"),
         ],
     )
-    guiding: bpy.props.BoolProperty(name="Path Guiding", description="Paths learn where light comes from")
+    guiding: bpy.props.EnumProperty(
+        name="Path Guiding",
+        description="Whether paths learn where light comes from",
+        items=[
+            ("auto", "Automatic", "If a pilot and the first samples show that it pays; from 128 samples on"),
+            ("on", "On", "As long as it pays"),
+            ("off", "Off", "Never"),
+        ],
+    )
     clamp: bpy.props.FloatProperty(
         name="Clamp", description="The most that a scattered path may add to a pixel; 0: no limit", default=0.0, min=0.0
     )
@@ -87,7 +95,7 @@ def of_render(scene, in_viewport=False):
         # Without the pilot of `auto`, a change shows sooner.
         "roulette": "throughput" if in_viewport else chosen.roulette,
         "caustics": chosen.caustics,
-        "guiding": chosen.guiding,
+        "guiding": "off" if in_viewport else chosen.guiding,
         "seed": chosen.seed,
     }
     if scene.render.threads_mode == "FIXED":

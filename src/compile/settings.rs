@@ -131,6 +131,9 @@ fn check_integrator(files: &CompileContext, integrator: &IntegratorDesc) -> Resu
         IntegratorDesc::Path { rr_depth: Some(0), .. } => {
             return Err(files.error("integrator.rr_depth", "must be at least 1"));
         }
+        IntegratorDesc::Path { light_samples: Some(count), .. } if !(1..=64).contains(&count) => {
+            return Err(files.error("integrator.light_samples", format!("must be from 1 to 64, not {count}")));
+        }
         IntegratorDesc::Path { clamp: Some(clamp), .. } => {
             files.positive("integrator.clamp", f64::from(clamp))?;
         }

@@ -221,6 +221,10 @@ pub enum IntegratorDesc {
         /// When Russian roulette may end a path. Default: auto, or throughput where `rr_depth` is given.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         roulette: Option<RouletteDesc>,
+        /// How many lights are sampled at the first surface or point in a medium that a path meets, from 1 to 64.
+        /// Default: with roulette auto, 1 to 4, as its pilot finds the least error for the time; else 1.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        light_samples: Option<u32>,
         /// How directions towards lights are found.
         #[serde(default)]
         strategy: StrategyDesc,
@@ -240,7 +244,7 @@ pub enum IntegratorDesc {
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         hide_emitters: bool,
         /// Whether paths learn from earlier ones where light comes from: less noise where most of it comes by few ways,
-        /// such as through a door ajar, for some time of learning. Default: off.
+        /// such as through a door ajar, for some time of learning. Default: auto.
         #[serde(default, skip_serializing_if = "GuidingDesc::is_default")]
         guiding: GuidingDesc,
         /// How caustics are found: light that mirrors and clear glass throw on other surfaces. Default: paths.
@@ -301,6 +305,7 @@ impl IntegratorDesc {
             max_depth,
             rr_depth,
             roulette: None,
+            light_samples: None,
             strategy,
             clamp: None,
             regularize: None,
@@ -390,10 +395,11 @@ pub enum RouletteDesc {
 #[serde(rename_all = "snake_case")]
 pub enum GuidingDesc {
     /// Never.
-    #[default]
     Off,
-    /// If a pilot finds that it lowers the error more than it costs, after four samples of each pixel. Never with fewer
-    /// than 64 samples of each, nor with a target error or photons, nor in shards.
+    /// From the ninth sample of each pixel on, as long as it lowers the error by more than it costs, which a pilot and
+    /// samples with and without it show. Never with fewer than 128 samples of each, with a target error or photons, or
+    /// in shards.
+    #[default]
     Auto,
     /// From the second sample of each pixel on, as long as it pays.
     On,

@@ -75,6 +75,9 @@ pub mod dimensions {
         1 + 2 * bounce
     }
 
+    /// As [`light`] of the first vertex, for a further choice that does not depend on the other.
+    pub const FURTHER_LIGHT: u32 = 1 << 30;
+
     /// Of path tracing: choice of a lobe (one), a direction (two) and roulette (one), at the vertex with this many
     /// bounces before it.
     pub const fn bsdf(bounce: u32) -> u32 {
@@ -229,6 +232,8 @@ pub struct PassContext<'a> {
     pub caustics: Option<&'a Caustics<'a>>,
     /// What Russian roulette goes by, if it is [`Roulette::Auto`].
     pub continuations: Option<&'a ContinuationGrid>,
+    /// Lights that are sampled at the first vertex of a path, at least 1.
+    pub light_samples: u32,
 }
 
 /// The photons that a part of a pass traces.

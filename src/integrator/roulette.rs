@@ -85,6 +85,11 @@ pub struct PilotRecords {
     pub shadow_rays: u64,
     /// Of these, those that reached their lights.
     pub unoccluded: u64,
+    /// Shadow rays towards the second light of a first vertex.
+    pub further_shadow_rays: u64,
+    /// What a sample's first vertex got from the first light less what it got from the second, each with half its
+    /// weight; by sample, the largest channel.
+    pub light_differences: Vec<f32>,
 }
 
 impl PilotRecords {
@@ -93,6 +98,8 @@ impl PilotRecords {
         self.continuations.append(&mut other.continuations);
         self.shadow_rays += other.shadow_rays;
         self.unoccluded += other.unoccluded;
+        self.further_shadow_rays += other.further_shadow_rays;
+        self.light_differences.append(&mut other.light_differences);
     }
 }
 

@@ -22,7 +22,7 @@ const PIXELS_PER_PIXEL: f64 = 1.0 / 128.0;
 /// The fewest and the most of them.
 const PIXELS: [f64; 2] = [512.0, 8192.0];
 
-/// Samples of a pilot pixel with and without the guide; the latter give the brightness and the rays of a path alone.
+/// Samples of a pilot pixel with and without the guide; the latter give the brightness alone.
 const SAMPLES: u32 = 16;
 const UNGUIDED_SAMPLES: u32 = 2;
 
@@ -35,12 +35,9 @@ const FLOOR: f64 = 0.01;
 /// Parts of the pilot, each of which is left out once to find the deviation of its result.
 const PARTS: usize = 16;
 
-/// By how many standard deviations guiding must pay.
+/// The least gain of a guide that may pay, and how many standard deviations it may have missed that by.
+const LEAST_GAIN: f64 = 1.15;
 const CONFIDENCE: f64 = 2.0;
-
-/// Time of a ray of a guided path over that of another, about, learning included: less where rays or materials take
-/// longer.
-const GUIDED_COST: f64 = 1.9;
 
 /// What traces the pilot.
 #[derive(Clone, Copy)]
@@ -79,15 +76,12 @@ pub(super) struct GuidingGain {
     pub variance: f64,
     /// The standard deviation of that.
     deviation: f64,
-    /// Rays of a guided sample over those of another.
-    rays: f64,
 }
 
 impl GuidingGain {
-    /// Whether guiding lowers the error by more than it raises the cost. The cost is by rays: the same decision on any
-    /// machine.
-    pub fn pays(&self) -> bool {
-        self.variance - CONFIDENCE * self.deviation > GUIDED_COST * self.rays
+    /// Whether the guide may pay once it has learned more. After so few samples it seems to gain less than it will.
+    pub fn may_pay(&self) -> bool {
+        self.variance + CONFIDENCE * self.deviation > LEAST_GAIN
     }
 }
 
@@ -181,11 +175,6 @@ impl PilotSamples {
         sum / (3 * self.pixels.len()).max(1) as f64
     }
 
-    /// Rays of a sample.
-    fn rays(&self) -> f64 {
-        self.counts.total() as f64 / (self.pixels.len() as f64 * f64::from(self.samples)).max(1.0)
-    }
-
     /// The mean radiance of a pixel and those around it.
     fn around(&self, index: usize) -> [f64; 3] {
         let rows = self.pixels.len() / self.columns;
@@ -201,8 +190,8 @@ impl PilotSamples {
         sum.map(|sum| sum / count)
     }
 
-    /// What the guide of these samples gains over `unguided`; `None` if they are black or all alike.
-    pub fn gain_over(&self, unguided: &Self) -> Option<GuidingGain> {
+    /// What the guide of these samples gains; `None` if they are black or all alike.
+    pub fn gain(&self) -> Option<GuidingGain> {
         let floor = FLOOR * self.mean().powi(2);
         let count = f64::from(self.samples);
         // Relative variances: the guided one, and how much more it is without guide.
@@ -222,9 +211,8 @@ impl PilotSamples {
         let mean = without.iter().sum::<f64>() / PARTS as f64;
         let spread = without.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>();
         let deviation = (spread * (PARTS - 1) as f64 / PARTS as f64).sqrt();
-        let rays = self.rays() / unguided.rays();
-        let found = GuidingGain { variance: gain(all), deviation, rays };
-        [found.variance, deviation, rays].iter().all(|value| value.is_finite()).then_some(found)
+        let found = GuidingGain { variance: gain(all), deviation };
+        (found.variance.is_finite() && deviation.is_finite()).then_some(found)
     }
 }
 
@@ -233,28 +221,23 @@ mod tests {
     use super::*;
 
     /// Pixels whose samples are 0 or 2, as often, with this excess.
-    fn samples(excess: impl Fn(usize) -> f64, rays: u64) -> PilotSamples {
+    fn gain(excess: impl Fn(usize) -> f64) -> GuidingGain {
         let pixel = |i| PilotPixel { radiance: [1.0; 3], square: [2.0; 3], excess: [excess(i); 3] };
-        let counts = RayCounts { camera: rays, ..RayCounts::default() };
-        PilotSamples { pixels: (0..400).map(pixel).collect(), columns: 20, samples: SAMPLES, counts }
+        let pixels = (0..400).map(pixel).collect();
+        PilotSamples { pixels, columns: 20, samples: SAMPLES, counts: RayCounts::default() }.gain().unwrap()
     }
 
     #[test]
-    fn gains_are_ratios_of_variances_and_must_exceed_the_cost() {
-        let unguided = PilotSamples { samples: UNGUIDED_SAMPLES, ..samples(|_| 0.0, 400) };
+    fn gains_are_ratios_of_variances() {
         // The variance of a sample is 16 / 15.
-        let gain = samples(|_| 32.0 / 15.0, 3200).gain_over(&unguided).unwrap();
-        assert!((gain.variance - 3.0).abs() < 1e-9 && gain.deviation < 1e-9 && (gain.rays - 1.0).abs() < 1e-9);
-        assert!(gain.pays());
-        let gain = samples(|_| 32.0 / 15.0, 6400).gain_over(&unguided).unwrap();
-        assert!((gain.rays - 2.0).abs() < 1e-9 && !gain.pays());
-        // As much, but by a few pixels alone.
-        let gain = samples(|i| if i % 100 == 7 { 3200.0 / 15.0 } else { 0.0 }, 3200).gain_over(&unguided).unwrap();
-        assert!((gain.variance - 3.0).abs() < 1e-9 && gain.deviation > 0.8 && !gain.pays());
-        assert!(
-            PilotSamples { pixels: vec![PilotPixel::default(); 400], ..unguided.clone() }
-                .gain_over(&unguided)
-                .is_none()
-        );
+        let found = gain(|_| 32.0 / 15.0);
+        assert!((found.variance - 3.0).abs() < 1e-9 && found.deviation < 1e-9 && found.may_pay());
+        let found = gain(|_| 1.0 / 15.0);
+        assert!((found.variance - 1.0625).abs() < 1e-9 && found.deviation < 1e-9 && !found.may_pay());
+        // Little, but by a few pixels alone: it may be more.
+        let found = gain(|i| if i % 100 == 7 { 200.0 / 15.0 } else { 0.0 });
+        assert!((found.variance - 1.125).abs() < 1e-9 && found.deviation > 0.03 && found.may_pay());
+        let black = PilotSamples { pixels: vec![PilotPixel::default(); 400], columns: 20, ..PilotSamples::default() };
+        assert_eq!(black.gain(), None);
     }
 }

@@ -147,10 +147,11 @@ pub struct Replayed {
     pub surface: SurfaceSample,
 }
 
-/// The values of one sample of one pixel, before the filter's weight: exactly those that the picture has.
+/// The values of one sample of one pixel, before the filter's weight: exactly those that the picture has, unless
+/// `guiding` is `auto` and has guided it.
 ///
 /// # Errors
-/// If the pixel lies outside the film.
+/// If the pixel lies outside the film; with `guiding` `on`.
 pub fn replay(
     scene: &Scene,
     accel: &dyn Accelerator,
@@ -168,12 +169,11 @@ pub fn replay(
             ": with guiding, a sample depends on all that were before; replay it with `guiding` off or `guide`",
         ));
     }
-    if settings.has_guiding_pilot() && sample >= planner::LEARNED {
-        let message = format!(
-            ": with `guiding` auto, samples from {} on may depend on those before; give `guiding` off or `guide`",
-            planner::LEARNED
+    if settings.has_guiding_pilot() && sample >= planner::GUIDED_START {
+        tracing::warn!(
+            "with `guiding` auto, samples from {} on may be guided in the picture; this one is replayed without",
+            planner::GUIDED_START
         );
-        return Err(refused("pixel", message));
     }
     let mut renderer = TileRenderer::new(scene, accel, settings);
     let workspace = [Mutex::<TileWorkspace>::default()];

@@ -35,10 +35,75 @@ const LARGEST_ERROR: f64 = 20.0;
 /// Errors times rays on three interiors are least between 1 and 2.
 const SURVIVAL_SCALE: f32 = 1.5;
 
+/// The most lights that are sampled at a first vertex.
+const MAX_LIGHT_SAMPLES: u32 = 4;
+
+/// Rays that are left of a sample when roulette ends paths, about: from half of them to all.
+const RAYS_WITH_ROULETTE: f64 = 0.7;
+
+/// What varies over a pixel, which the pilot does not see and lights do not lower, over the variance that it sees.
+const VARIANCE_OF_PIXELS: f64 = 0.15;
+
+/// More than one are sampled only if variance times rays is less than this part of that with one.
+const WORTHWHILE_COST: f64 = 0.95;
+
 /// What the pilot of a picture has found.
 pub(super) struct RouletteEstimates {
     pub continuations: ContinuationGrid,
+    /// Lights to be sampled at the first vertex of a path.
+    pub light_samples: u32,
     pixels: PixelScales,
+}
+
+/// The relative variance and the rays of a sample of the pilot, and the part of the lights at its first vertex.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct SampleCosts {
+    /// With two lights.
+    variance: f64,
+    /// Of a single light.
+    light_variance: f64,
+    /// With one light.
+    rays: f64,
+    /// Of each further light.
+    light_rays: f64,
+}
+
+impl SampleCosts {
+    /// Found by the samples, for pixels whose errors count with these factors.
+    fn of(grid: PilotGrid, samples: &PilotSamples, scales: &[f32]) -> Self {
+        // Of one sample, if errors are to fall with their number.
+        let error = |i: usize, difference: f32| {
+            let relative = difference * scales[cell_of(grid, i)];
+            f64::from(0.5 * GROUP as f32 * relative * relative).min(LARGEST_ERROR)
+        };
+        let count = samples.values.len() as f64;
+        let (values, lights) = (samples.values.iter().enumerate(), samples.light_differences.iter().enumerate());
+        let per_sample = |rays: u64| rays as f64 / (f64::from(2 * GROUP) * count);
+        let further = samples.records.further_shadow_rays;
+        Self {
+            variance: values.map(|(i, &[a, b])| error(i, a - b)).sum::<f64>() / count,
+            // Half the difference of two lights has half the variance of one, and each of the two groups has one.
+            light_variance: 2.0 * lights.map(|(i, &[a, b])| error(i, a) + error(i, b)).sum::<f64>() / count,
+            rays: per_sample(samples.counts.total() - further),
+            light_rays: per_sample(further),
+        }
+    }
+
+    /// The variance and the rays of a sample with this many lights at its first vertex.
+    fn with(&self, lights: u32) -> [f64; 2] {
+        let lights = f64::from(lights);
+        let variance = self.variance + self.light_variance * (1.0 / lights - 0.5);
+        [variance.max(0.0), self.rays + (lights - 1.0) * self.light_rays]
+    }
+
+    /// The number of lights for which variance times rays is least.
+    fn best_light_samples(&self) -> u32 {
+        let unseen = VARIANCE_OF_PIXELS * self.with(1)[0];
+        let costs = Self { variance: self.variance + unseen, rays: RAYS_WITH_ROULETTE * self.rays, ..*self };
+        let cost = |lights: u32| costs.with(lights).into_iter().product::<f64>();
+        let best = (2..=MAX_LIGHT_SAMPLES).min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(1);
+        if cost(best) < WORTHWHILE_COST * cost(1) { best } else { 1 }
+    }
 }
 
 /// Pixels of the pilot, evenly spread over the picture.
@@ -100,13 +165,20 @@ impl PixelScales {
 #[derive(Default)]
 struct PilotSamples {
     values: Vec<[f32; 2]>,
+    /// In place of the values, the differences of lights.
+    light_differences: Vec<[f32; 2]>,
     records: PilotRecords,
     counts: RayCounts,
 }
 
 impl RouletteEstimates {
     /// Traces the pilot of a picture; `None` if it is black.
-    pub fn new(renderer: &TileRenderer, workspaces: &[Mutex<TileWorkspace>]) -> Option<Self> {
+    /// Without `light_samples` it finds how many are best.
+    pub fn new(
+        renderer: &TileRenderer,
+        workspaces: &[Mutex<TileWorkspace>],
+        light_samples: Option<u32>,
+    ) -> Option<Self> {
         let grid = PilotGrid::new(renderer.view);
         let chunk = TILE_SIZE * TILE_SIZE / (2 * GROUP);
         let parts: Vec<PilotSamples> = (0..grid.count().div_ceil(chunk))
@@ -120,32 +192,32 @@ impl RouletteEstimates {
         let mut all = PilotSamples::default();
         for mut part in parts {
             all.values.extend(part.values);
+            all.light_differences.extend(part.light_differences);
             all.records.append(&mut part.records);
             all.counts.add(&part.counts);
         }
-        Self::from_samples(grid, &all)
+        Self::from_samples(grid, &all, light_samples)
     }
 
-    fn from_samples(grid: PilotGrid, samples: &PilotSamples) -> Option<Self> {
+    fn from_samples(grid: PilotGrid, samples: &PilotSamples, light_samples: Option<u32>) -> Option<Self> {
         let mut continuations = ContinuationGrid::new(&samples.records)?;
-        let count = samples.values.len() as f64;
         let values = blurred(&cell_means(grid, &samples.values), grid.size[0] / CELL_SIDE);
         let mut positive: Vec<f32> = values.iter().copied().filter(|&value| value > 0.0).collect();
         positive.sort_unstable_by(f32::total_cmp);
         let median = *positive.get(positive.len() / 2)?;
-        let scales: Vec<f32> = values.iter().map(|&value| 1.0 / value.hypot(DARKEST * median)).collect();
-        // Of one sample, if errors are to fall with their number.
-        let error = |(i, &[a, b]): (usize, &[f32; 2])| {
-            let relative = (a - b) * scales[cell_of(grid, i)];
-            f64::from(0.5 * GROUP as f32 * relative * relative).min(LARGEST_ERROR)
-        };
-        let variance = samples.values.iter().enumerate().map(error).sum::<f64>() / count;
-        let rays = samples.counts.total() as f64 / (f64::from(2 * GROUP) * count);
+        let scales =
+            |darkest: f32| -> Vec<f32> { values.iter().map(|&value| 1.0 / value.hypot(darkest * median)).collect() };
+        let light_samples =
+            light_samples.unwrap_or_else(|| SampleCosts::of(grid, samples, &scales(1.0)).best_light_samples());
+        let scales = scales(DARKEST);
+        let costs = SampleCosts::of(grid, samples, &scales);
+        tracing::debug!("pilot of roulette: {costs:?}, {light_samples} light samples");
+        let [variance, rays] = costs.with(light_samples);
         // Error times cost is least where going on adds to a path's error and cost in the proportion of all paths.
         continuations.scale(SURVIVAL_SCALE * (rays / variance.max(f64::MIN_POSITIVE)).sqrt().min(1e6) as f32);
         let size = grid.size.map(|side| side / CELL_SIDE);
         let cells_per_pixel = Vec2::new(size[0] as f32 / grid.view[0] as f32, size[1] as f32 / grid.view[1] as f32);
-        Some(Self { continuations, pixels: PixelScales { size, cells_per_pixel, scales } })
+        Some(Self { continuations, pixels: PixelScales { size, cells_per_pixel, scales }, light_samples })
     }
 
     /// Sets what roulette multiplies the throughputs of the paths of pixels by.
@@ -181,6 +253,12 @@ fn trace(
     let group = GROUP as usize;
     let mean = |k: usize| (k * group..(k + 1) * group).map(value).sum::<f32>() / GROUP as f32;
     samples.values = (0..workspace.sample_count() / (2 * group)).map(|i| [mean(2 * i), mean(2 * i + 1)]).collect();
+    let differences = std::mem::take(&mut samples.records.light_differences);
+    let mean_of = |values: &[f32]| values.iter().filter(|value| value.is_finite()).sum::<f32>() / GROUP as f32;
+    samples.light_differences = differences
+        .chunks_exact(2 * group)
+        .map(|of_pixel| [mean_of(&of_pixel[..group]), mean_of(&of_pixel[group..])])
+        .collect();
     samples.counts = std::mem::take(&mut workspace.integrator.counts);
     samples
 }
@@ -251,9 +329,41 @@ mod tests {
     }
 
     #[test]
+    fn as_many_lights_are_sampled_as_pay() {
+        let costs =
+            |variance, light_variance, light_rays| SampleCosts { variance, light_variance, rays: 4.0, light_rays };
+        // All noise is that of lights.
+        assert_eq!(costs(0.5, 1.0, 0.3).with(1), [1.0, 4.0]);
+        assert_eq!(costs(0.5, 1.0, 0.3).with(4), [0.25, 4.9]);
+        assert_eq!(costs(0.5, 1.0, 0.3).best_light_samples(), MAX_LIGHT_SAMPLES);
+        // Some of it: (0.4 + 3/4 / n) (2.8 + 0.7 (n - 1)) is least for two.
+        assert_eq!(costs(0.25 + 0.375, 0.75, 0.7).best_light_samples(), 2);
+        // None, or none at all.
+        assert_eq!(costs(1.0, 0.0, 0.5).best_light_samples(), 1);
+        assert_eq!(costs(0.0, 0.0, 0.5).best_light_samples(), 1);
+        // Little.
+        assert_eq!(costs(0.9, 0.2, 0.3).best_light_samples(), 1);
+    }
+
+    /// Two lights that differ by one, in every pilot pixel and group.
+    #[test]
+    fn variances_of_lights_are_found_by_their_differences() {
+        let grid = PilotGrid::new([64, 64]);
+        let count = grid.count() as usize;
+        let samples = PilotSamples {
+            values: vec![[1.5, 0.5]; count],
+            light_differences: vec![[0.25, -0.25]; count],
+            records: PilotRecords { further_shadow_rays: 16 * count as u64, ..PilotRecords::default() },
+            counts: RayCounts { camera: 64 * count as u64, ..RayCounts::default() },
+        };
+        let costs = SampleCosts::of(grid, &samples, &vec![1.0; count]);
+        assert_eq!(costs, SampleCosts { variance: 4.0, light_variance: 1.0, rays: 3.0, light_rays: 1.0 });
+    }
+
+    #[test]
     fn a_black_pilot_estimates_nothing() {
         let grid = PilotGrid::new([64, 64]);
         let samples = PilotSamples { values: vec![[0.0; 2]; grid.count() as usize], ..PilotSamples::default() };
-        assert!(RouletteEstimates::from_samples(grid, &samples).is_none());
+        assert!(RouletteEstimates::from_samples(grid, &samples, None).is_none());
     }
 }

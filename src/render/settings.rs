@@ -28,7 +28,7 @@ const MOST_SAMPLES: u32 = 1 << 16;
 const MAX_THREADS: usize = 4096;
 
 /// A pilot decides on guiding only of pictures with at least as many samples per pixel, so that it costs little,
-const LEAST_GUIDED_SPP: u32 = 64;
+const LEAST_GUIDED_SPP: u32 = 128;
 
 /// with as many samples in all, so that there is something to learn from,
 const LEAST_GUIDED_SAMPLES: u64 = 1 << 20;
@@ -400,6 +400,7 @@ mod tests {
             hide_emitters: false,
             guiding: GuidingDesc::default(),
             roulette: None,
+            light_samples: None,
             caustics: CausticsDesc::Paths,
         };
         assert_eq!(s.integrator, changed);

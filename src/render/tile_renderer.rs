@@ -41,6 +41,8 @@ pub(super) struct TileRenderer<'a> {
     caustics: Option<CausticPass>,
     /// What Russian roulette goes by, if it is to and the pilot was traced.
     roulette: Option<RouletteEstimates>,
+    /// Lights that are sampled at the first vertex of a path; `None` for as many as the pilot finds best.
+    light_samples: Option<u32>,
     needs_pilot: bool,
 }
 
@@ -124,19 +126,25 @@ impl<'a> TileRenderer<'a> {
             caustics: settings.gathers_photons().then(|| CausticPass::new(scene, accel, settings)).flatten(),
             guide: settings.guide.as_ref().and_then(|guide| guide.of_scene(accel.bounds())),
             roulette: None,
+            light_samples: match settings.integrator {
+                IntegratorDesc::Path { light_samples, .. } => light_samples,
+                _ => None,
+            },
             needs_pilot: settings.integrator.roulette() == Some(RouletteDesc::Auto),
         }
     }
 
     fn pass<'b>(&'b self, guidance: Guidance<'b>) -> PassContext<'b> {
         let continuations = self.roulette.as_ref().map(|roulette| &roulette.continuations);
-        PassContext { world: &self.world, render: self.context, guidance, caustics: None, continuations }
+        let light_samples =
+            self.light_samples.or(self.roulette.as_ref().map(|roulette| roulette.light_samples)).unwrap_or(1);
+        PassContext { world: &self.world, render: self.context, guidance, caustics: None, continuations, light_samples }
     }
 
     /// Traces the pilot of the picture, if roulette needs one.
     pub fn prepare(&mut self, workspaces: &[Mutex<TileWorkspace>]) {
         if self.needs_pilot {
-            self.roulette = RouletteEstimates::new(self, workspaces);
+            self.roulette = RouletteEstimates::new(self, workspaces, self.light_samples);
         }
     }
 

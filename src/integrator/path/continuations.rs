@@ -1,5 +1,7 @@
 //! What pilot paths find after each scattering, for Russian roulette.
 
+use std::ops::Range;
+
 use super::block::{Vertices, spawn};
 use super::radiance::Output;
 use super::wave::PathRows;
@@ -30,6 +32,10 @@ pub(super) struct ContinuationRecorder {
     marked: usize,
     shadow_rays: u64,
     unoccluded: u64,
+    /// The shadow rays of the wave that are towards the first lights of first vertices.
+    first_lights: Vec<Range<usize>>,
+    /// What they bring less what those towards the second lights bring, by sample.
+    light_differences: Vec<f32>,
 }
 
 impl ContinuationRecorder {
@@ -63,6 +69,32 @@ impl ContinuationRecorder {
         }
     }
 
+    /// Whether paths are recorded.
+    pub fn is_enabled(&self) -> bool {
+        self.is_enabled
+    }
+
+    /// These shadow rays of the wave, all after those of calls before, are towards the first lights of first vertices.
+    pub fn mark_first_lights(&mut self, rays: Range<usize>) {
+        if self.is_enabled {
+            self.first_lights.push(rays);
+        }
+    }
+
+    /// Records what a shadow ray of a first vertex brings.
+    pub fn add_direct(&mut self, ray: usize, slot: u32, light: Rgb) {
+        if !self.is_enabled {
+            return;
+        }
+        let range = self.first_lights.partition_point(|range| range.end <= ray);
+        let is_first = self.first_lights.get(range).is_some_and(|range| range.contains(&ray));
+        let slot = slot as usize;
+        if self.light_differences.len() <= slot {
+            self.light_differences.resize(slot + 1, 0.0);
+        }
+        self.light_differences[slot] += if is_first { light.max_channel() } else { -light.max_channel() };
+    }
+
     /// Counts shadow rays that reached their lights.
     pub fn count_unoccluded(&mut self, count: usize) {
         self.unoccluded += count as u64;
@@ -88,6 +120,9 @@ impl ContinuationRecorder {
         }
         records.shadow_rays += self.shadow_rays;
         records.unoccluded += self.unoccluded;
+        records.further_shadow_rays += self.first_lights.iter().map(|range| range.len() as u64).sum::<u64>();
+        self.light_differences.resize(samples, 0.0);
+        records.light_differences.append(&mut self.light_differences);
         *self = Self::default();
     }
 }

@@ -18,12 +18,37 @@ use crate::sampling::{SampleRows, power_heuristic};
 
 /// Samples light for the vertices of a block, and finds the shadow rays.
 pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wave, block: usize) {
-    let Wave { vertices, media, terminator_rays, light_queue, bsdf_rows, guided, .. } = wave;
-    let count = vertices.count;
+    let count = wave.vertices.count;
     if context.scene.lights.is_empty() {
-        vertices.direct.status[..count].fill(spawn::NONE);
+        wave.vertices.direct.status[..count].fill(spawn::NONE);
         return;
     }
+    let samples = context.light_samples();
+    for k in 0..samples {
+        wave.draw_light(context, k, samples);
+        sample_once(context, regions, wave, block);
+        if samples > 1 {
+            vectorize!(scale(&mut wave.vertices.direct, 1.0 / samples as f32));
+        }
+        if k + 1 < samples {
+            let first = wave.shadows.count;
+            wave.queue_shadow_rays(context, block);
+            wave.continuations.mark_first_lights(first..wave.shadows.count);
+        }
+    }
+}
+
+#[inline(always)]
+fn scale(direct: &mut DirectRows, factor: f32) {
+    for row in &mut direct.contribution.0 {
+        row.iter_mut().for_each(|value| *value *= factor);
+    }
+}
+
+/// Samples a light for each vertex of a block.
+fn sample_once(context: &Context, regions: Option<&Regions>, wave: &mut Wave, block: usize) {
+    let Wave { vertices, media, terminator_rays, light_queue, bsdf_rows, guided, .. } = wave;
+    let count = vertices.count;
     choose_lights(context, vertices, light_queue);
     let Vertices { rows, light_samples: lights, light_evals, bsdfs, non_diffuse, .. } = &mut *vertices;
     let surfaces = Surfaces { scene: context.scene, count, rows, bsdfs, non_diffuse };

@@ -47,6 +47,9 @@ use wave::Wave;
 /// Segments before the roulette of pilot paths.
 const PILOT_RR_DEPTH: u32 = 4;
 
+/// Lights that pilot paths sample at their first vertex, independent of each other, to find how much they differ.
+const PILOT_LIGHT_SAMPLES: u32 = 2;
+
 /// Path tracing.
 #[derive(Clone, Debug)]
 pub struct PathIntegrator {
@@ -86,6 +89,11 @@ struct Context<'a> {
 }
 
 impl Context<'_> {
+    /// How many lights are sampled at each vertex.
+    fn light_samples(&self) -> u32 {
+        if self.bounce == 0 { self.pass.light_samples } else { 1 }
+    }
+
     /// Whether any AOV of surfaces is requested.
     fn needs_surface_aovs(&self) -> bool {
         self.config.surface_aovs != SurfaceAovs::default()
@@ -138,7 +146,13 @@ impl Integrator for PathIntegrator {
             light_aovs: LightAovRequest::default(),
             ..self.clone()
         };
-        let pass = PassContext { guidance: Guidance::default(), caustics: None, continuations: None, ..*pass };
+        let pass = PassContext {
+            guidance: Guidance::default(),
+            caustics: None,
+            continuations: None,
+            light_samples: PILOT_LIGHT_SAMPLES,
+            ..*pass
+        };
         workspace.paths.0.continuations.enable();
         pilot.render_batch(&pass, samples, workspace);
         let Workspace { out, paths: PathBuffers(wave), .. } = workspace;

@@ -50,6 +50,9 @@ pub(super) fn shadow(context: &Context, wave: &mut Wave, out: &mut Output, count
             let rows = &shadows.rows[block];
             let (slot, light) = (rows.slot[i % BATCH], rows.contribution.get(i % BATCH));
             out.add(slot, light);
+            if context.bounce == 0 {
+                wave.continuations.add_direct(i, slot, light);
+            }
             if let Some(&(event, id)) = wave.light_aovs.shadow_sources.get(i) {
                 out.add_to_light_aovs(context, slot, light, event, id);
             }

@@ -199,26 +199,33 @@ impl Wave {
         (self.count - block * BATCH).min(BATCH)
     }
 
-    /// Draws the random numbers of the vertices of a block.
+    /// Draws the random numbers of the vertices of a block, but for those of lights.
     pub fn draw(&mut self, context: &Context) {
-        let Vertices { rows, requests, count, u_light, u_bsdf, .. } = &mut self.vertices;
+        let Vertices { rows, requests, count, u_bsdf, .. } = &mut self.vertices;
         requests.samples = rows.sample;
         for (pixel, seed) in requests.pixels.iter_mut().zip(rows.seed) {
             *pixel = PixelSeed(seed);
         }
-        let sampler = &context.config.sampler;
-        if !context.scene.lights.is_empty() {
-            sampler.sample_4d_batch(requests, *count, dimensions::light(context.bounce), u_light);
+        context.config.sampler.sample_4d_batch(requests, *count, dimensions::bsdf(context.bounce), u_bsdf);
+    }
+
+    /// Draws the random numbers with which each vertex of a block chooses the light `k` of `samples`. All of a pixel
+    /// are one sequence, but in a pilot, where they are independent.
+    pub fn draw_light(&mut self, context: &Context, k: u32, samples: u32) {
+        let Vertices { rows, requests, count, u_light, .. } = &mut self.vertices;
+        let is_apart = self.continuations.is_enabled();
+        let set = if is_apart && k > 0 { dimensions::FURTHER_LIGHT } else { dimensions::light(context.bounce) };
+        requests.samples = rows.sample;
+        if samples > 1 && !is_apart {
+            requests.samples.iter_mut().for_each(|sample| *sample = sample.wrapping_mul(samples).wrapping_add(k));
         }
-        sampler.sample_4d_batch(requests, *count, dimensions::bsdf(context.bounce), u_bsdf);
+        context.config.sampler.sample_4d_batch(requests, *count, set, u_light);
+        requests.samples = rows.sample;
     }
 
     /// Queues the shadow rays of a block's vertices and moves the paths that go on to the index `survivors` and those
     /// after it; the result is the number of all paths that go on so far.
     pub fn append(&mut self, context: &Context, block: usize, survivors: usize) -> usize {
-        if context.config.clamp.is_finite() {
-            self.vertices.clamp_direct(context);
-        }
         self.queue_shadow_rays(context, block);
         let Vertices { count, scatter, .. } = &self.vertices;
         let lanes = Compaction::equal(&scatter.status, spawn::SPAWNED, *count);
@@ -260,7 +267,11 @@ impl Wave {
         }
     }
 
-    fn queue_shadow_rays(&mut self, context: &Context, block: usize) {
+    /// Queues the shadow rays of a block's vertices.
+    pub fn queue_shadow_rays(&mut self, context: &Context, block: usize) {
+        if context.config.clamp.is_finite() {
+            self.vertices.clamp_direct(context);
+        }
         let Vertices { count, rows, direct, .. } = &self.vertices;
         let lanes = Compaction::equal(&direct.status, spawn::SPAWNED, *count);
         if context.config.needs_light_aovs() {

@@ -3,7 +3,7 @@
 //! Later iterations are better than earlier ones, so they are averaged with [`IterationWeights`].
 
 use super::iteration_weights::{IterationWeights, mean};
-use super::training_schedule::{Training, is_refinement, iteration_end, iteration_start, next_refinement};
+use super::training_schedule::{Training, is_refinement, next_refinement};
 use crate::bytes::{ByteReader, ByteWriter};
 use crate::error::Result;
 use crate::film::{Film, LayerKind};
@@ -14,6 +14,10 @@ use crate::render::TILE_SIZE;
 /// Iterations of at least this many samples decide whether guiding goes on: their variance times rays must be so much
 /// less than without.
 const MIN_GAINS: [(u32, f64); 2] = [(8, 1.2), (16, GUIDED_COST)];
+
+/// The same where samples are compared with unguided ones after a pilot, in every iteration: the variance of few
+/// samples does not show how well Sobol points spread more of them without a guide.
+const MIN_COMPARED_GAIN: f64 = 2.2;
 
 /// Time of a ray of a guided path over that of another, about, learning included: from 1.2 under many lights to 1.9 in
 /// a Cornell box.
@@ -45,7 +49,7 @@ impl GuidedPlanner {
     /// Of a render that begins, whose film this is.
     pub fn new(film: &Film) -> Result<Self> {
         let guide = Guide::new(Aabb::EMPTY, 0.0);
-        let weights = IterationWeights::new(film, 1.0);
+        let weights = IterationWeights::new(film);
         Ok(Self {
             guide: Some(guide),
             iteration: iteration(film)?,
@@ -56,24 +60,35 @@ impl GuidedPlanner {
         })
     }
 
-    /// With a guide that has learned from the `done` samples per pixel of the film. Guided samples have `gain` times
-    /// less variance by the pilot. `None` if there is no memory for them.
-    pub fn trained(film: &Film, guide: Guide, done: u32, gain: f64) -> Option<Self> {
+    /// With a guide that has learned from the `done` samples per pixel of the film. `None` if there is no memory for
+    /// the samples of an iteration.
+    pub fn trained(film: &Film, guide: Guide, done: u32) -> Option<Self> {
         Some(Self {
             guide: Some(guide),
             iteration: iteration(film).ok()?,
             merged: done,
             rays: 0,
-            weights: IterationWeights::new(film, gain),
+            weights: IterationWeights::new(film),
             training: Training::FixedNumber,
         })
     }
 
     /// How many samples per pixel after the first `done` have the present guide and one weight.
     pub fn samples_with_this_guide(&self, done: u32) -> u32 {
-        let end = iteration_end(done);
+        let end = self.training.iteration_end(done);
         let end = if self.guide.is_some() { end.min(next_refinement(done)) } else { end };
         end.saturating_sub(done)
+    }
+
+    /// Whether the guide is used for the sample with this index.
+    pub fn guides(&self, sample: u32) -> bool {
+        self.training.guides(sample)
+    }
+
+    /// Whether the comparison after a pilot has ended guiding. All samples then have one weight, and nothing is left to
+    /// plan.
+    pub fn is_over(&self) -> bool {
+        self.guide.is_none() && !self.training.weighs(self.merged)
     }
 
     /// Whether the guide learns from the sample with this index. One that is used until the end does not.
@@ -93,7 +108,7 @@ impl GuidedPlanner {
         }
         // More samples may follow later.
         let is_last = self.training == Training::HalfOfSamples && done == spp;
-        if is_last || done == iteration_end(self.merged) {
+        if is_last || done == self.training.iteration_end(self.merged) {
             self.complete_iteration(film, done);
         }
     }
@@ -101,7 +116,7 @@ impl GuidedPlanner {
     /// Adds the iteration to the film, and ends guiding if it is not worth its cost.
     fn complete_iteration(&mut self, film: &mut Film, done: u32) {
         let samples = done - self.merged;
-        let gain = self.weights.add(film, &self.iteration, samples, self.rays);
+        let gain = self.weights.add(film, &self.iteration, [samples, done], self.rays, self.training.weighs(done));
         if let Some(guide) = &self.guide {
             let (leaves, nodes) = (guide.leaves(), guide.directional_nodes());
             tracing::debug!(
@@ -109,8 +124,10 @@ impl GuidedPlanner {
                  {nodes} nodes"
             );
         }
-        let is_worth_it = self.training == Training::FixedNumber
-            || MIN_GAINS.iter().all(|&(least, min_gain)| samples < least || gain >= min_gain);
+        let is_worth_it = match self.training {
+            Training::HalfOfSamples => MIN_GAINS.iter().all(|&(least, min_gain)| samples < least || gain >= min_gain),
+            Training::FixedNumber => !self.training.is_compared(done) || gain >= MIN_COMPARED_GAIN,
+        };
         if self.merged > 0 && !is_worth_it && self.guide.take().is_some() {
             tracing::info!("guiding does not pay and ends after {done} samples per pixel");
         }
@@ -132,7 +149,8 @@ impl GuidedPlanner {
     /// The film of the render together with the iteration under way.
     pub fn whole_film(&self, film: &Film, done: u32) -> Film {
         let mut whole = film.clone();
-        self.weights.clone().add(&mut whole, &self.iteration, done - self.merged, self.rays);
+        let (samples, is_weighed) = (done - self.merged, self.training.weighs(done));
+        self.weights.clone().add(&mut whole, &self.iteration, [samples, done], self.rays, is_weighed);
         whole
     }
 
@@ -154,10 +172,11 @@ impl GuidedPlanner {
     pub fn load(&mut self, bytes: &[u8], done: u32) -> Option<()> {
         let mut data = ByteReader::new(bytes);
         let [merged, has_guide, is_fixed] = data.integers()?.try_into().ok()?;
-        if has_guide.max(is_fixed) > 1 || !(merged == done || merged == iteration_start(done)) {
+        let training = if is_fixed == 1 { Training::FixedNumber } else { Training::HalfOfSamples };
+        if has_guide.max(is_fixed) > 1 || !(merged == done || merged == training.iteration_start(done)) {
             return None;
         }
-        self.training = if is_fixed == 1 { Training::FixedNumber } else { Training::HalfOfSamples };
+        self.training = training;
         self.merged = merged;
         self.rays = data.long()?;
         self.weights = IterationWeights::read(&mut data, &self.iteration)?;

@@ -73,10 +73,10 @@ fn block_means(tile: &FilmTile) -> Vec<[f64; 3]> {
     blocks(tile).map(of_block).collect()
 }
 
-/// Mean colour by block of the samples of two tiles, so that luck in one iteration does not change the ratios of
-/// variances.
-fn common_means(a: &FilmTile, b: &FilmTile) -> Vec<[f64; 3]> {
-    let both = |(a, b): ([f64; 3], [f64; 3])| [0, 1, 2].map(|k| 0.5 * (a[k] + b[k]));
+/// Mean colour by block of the samples of two tiles, of which the second has this part, so that luck in one iteration
+/// does not change the ratios of variances.
+fn common_means(a: &FilmTile, b: &FilmTile, part: f64) -> Vec<[f64; 3]> {
+    let both = |(a, b): ([f64; 3], [f64; 3])| [0, 1, 2].map(|k| (1.0 - part) * a[k] + part * b[k]);
     block_means(a).into_iter().zip(block_means(b)).map(both).collect()
 }
 
@@ -102,20 +102,35 @@ pub(super) fn mean(film: &Film) -> f64 {
 }
 
 impl IterationWeights {
-    /// Before the first iteration, whose samples have this weight.
-    pub fn new(film: &Film, weight: f64) -> Self {
-        Self { factors: vec![weight; film.tiles().len()], first: None, last: None }
+    /// Before the first iteration, whose samples have a weight of 1.
+    pub fn new(film: &Film) -> Self {
+        Self { factors: vec![1.0; film.tiles().len()], first: None, last: None }
     }
 
-    /// Adds an iteration of `spp` samples per pixel to the film of those before; the result is the variance times
-    /// rays of the first iteration over that of this one.
-    pub fn add(&mut self, film: &mut Film, iteration: &Film, samples: u32, rays: u64) -> f64 {
+    /// Adds an iteration of `samples` samples per pixel to the film of those before, `done` together, all with a weight
+    /// of 1 unless `is_weighed`; the result is the variance times rays of the first iteration over that of this one.
+    pub fn add(
+        &mut self,
+        film: &mut Film,
+        iteration: &Film,
+        [samples, done]: [u32; 2],
+        rays: u64,
+        is_weighed: bool,
+    ) -> f64 {
         let variances: Vec<_> = iteration.tiles().iter().map(|tile| block_variances(tile, samples)).collect();
         let pixels = iteration.sampled().area() as f64;
         let statistics = IterationStatistics { variances, rays: rays as f64 / (pixels * f64::from(samples)) };
-        let gain = if samples >= 2 { self.update(film, iteration, &statistics) } else { 1.0 };
+        let gain = if samples >= 2 {
+            self.update(film, iteration, &statistics, f64::from(samples) / f64::from(done))
+        } else {
+            1.0
+        };
         for ((tile, other), factor) in film.tiles_mut().iter_mut().zip(iteration.tiles()).zip(&self.factors) {
-            tile.merge_inverse_variance(other, *factor);
+            if is_weighed {
+                tile.merge_inverse_variance(other, *factor);
+            } else {
+                tile.merge(other);
+            }
         }
         if samples >= 2 {
             self.first.get_or_insert_with(|| statistics.clone());
@@ -124,11 +139,12 @@ impl IterationWeights {
         gain
     }
 
-    /// Sets the weights of an iteration by its variance and that of the last one; the result is its gain over the
-    /// first.
-    fn update(&mut self, film: &Film, iteration: &Film, statistics: &IterationStatistics) -> f64 {
+    /// Sets the weights of an iteration, which has this part of all samples, by its variance and that of the last one;
+    /// the result is its gain over the first.
+    fn update(&mut self, film: &Film, iteration: &Film, statistics: &IterationStatistics, part: f64) -> f64 {
         let (Some(first), Some(last)) = (&self.first, &self.last) else { return 1.0 };
-        let colors: Vec<_> = film.tiles().iter().zip(iteration.tiles()).map(|(a, b)| common_means(a, b)).collect();
+        let colors: Vec<_> =
+            film.tiles().iter().zip(iteration.tiles()).map(|(a, b)| common_means(a, b, part)).collect();
         let by_tile = |statistics: &IterationStatistics| -> Vec<f64> {
             statistics.variances.iter().zip(&colors).map(|(variances, colors)| relative(variances, colors)).collect()
         };

@@ -9,20 +9,21 @@ mod training_schedule;
 
 pub(super) use adaptive::AdaptivePlanner;
 pub(super) use guided::GuidedPlanner;
-pub(super) use pilot::LEARNED;
 pub(super) use pilot::PilotPlanner;
+pub(super) use training_schedule::GUIDED_START;
 
 use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Mutex;
 use std::time::Duration;
 
-use super::guiding_pilot::{GuidingGain, GuidingPilot};
+use super::guiding_pilot::GuidingPilot;
 use super::tile_renderer::{TileRenderer, TileWorkspace};
 use super::{GuidingStage, RenderSession, RenderState, Settings, Shard};
 use crate::error::Result;
 use crate::film::{DroppedSample, Film, FilmTile};
 use crate::integrator::{EPOCH, Guidance, RayCounts};
+use pilot::LEARNED;
 
 /// A pass over tiles of the film.
 #[derive(Clone, Debug)]
@@ -163,8 +164,8 @@ impl RenderState {
             }
             Planner::Adaptive(planner) => (&mut self.film, PassSamples::Groups { planner, most: samples.end }),
             Planner::Guided(planner) => {
-                let guide = planner.guide.as_ref();
-                let learner = guide.filter(|_| planner.learns(samples.start, spp));
+                let (learns, guides) = (planner.learns(samples.start, spp), planner.guides(samples.start));
+                let [learner, guide] = [learns, guides].map(|is_used| planner.guide.as_ref().filter(|_| is_used));
                 (
                     &mut planner.iteration,
                     PassSamples::Uniform { samples, guidance: Guidance { guide, learner, has_moments: false } },
@@ -193,6 +194,9 @@ impl RenderState {
             Planner::Pilot(planner) if self.tiles_in_partial_pass == 0 => planner.complete_samples(self.done),
             _ => {}
         }
+        if matches!(&self.planner, Planner::Guided(planner) if planner.is_over()) {
+            self.planner = Planner::Uniform;
+        }
     }
 
     /// Traces what is due of the pilot of guiding, and decides on guiding after it; the result is the rays traced.
@@ -207,7 +211,7 @@ impl RenderState {
             let unguided = pilot.unguided();
             let counts = unguided.counts;
             if !renderer.context.is_cancelled() {
-                planner.begin(unguided);
+                planner.begin(&unguided);
                 // Where the pilot is black there is nothing to learn.
                 if !planner.has_begun() {
                     self.planner = Planner::Uniform;
@@ -218,16 +222,15 @@ impl RenderState {
         if self.done < LEARNED || renderer.context.is_cancelled() {
             return RayCounts::default();
         }
-        let [unguided, guided] = planner.compare(&pilot);
+        let guided = pilot.guided(&planner.guide);
         if renderer.context.is_cancelled() {
             return RayCounts::default();
         }
-        let gain = guided.gain_over(&unguided);
+        let gain = guided.gain();
         tracing::info!("pilot of guiding: {gain:?}");
-        let paying = gain.filter(GuidingGain::pays);
+        let is_likely = gain.is_some_and(|gain| gain.may_pay());
         // Without memory for the samples of an iteration the picture is not guided.
-        let next =
-            paying.and_then(|gain| GuidedPlanner::trained(&self.film, planner.take_guide(), self.done, gain.variance));
+        let next = if is_likely { GuidedPlanner::trained(&self.film, planner.take_guide(), self.done) } else { None };
         self.planner = next.map_or(Planner::Uniform, |planner| Planner::Guided(Box::new(planner)));
         guided.counts
     }

@@ -7,23 +7,21 @@ use super::training_schedule::next_refinement;
 use crate::bytes::{ByteReader, ByteWriter};
 use crate::guiding::Guide;
 use crate::math::Aabb;
-use crate::render::guiding_pilot::{GuidingPilot, PilotSamples};
+use crate::render::guiding_pilot::PilotSamples;
 
 /// Samples per pixel before the decision.
-pub(in crate::render) const LEARNED: u32 = 4;
+pub(super) const LEARNED: u32 = 4;
 
 /// A guide that learns before it is used, if it will be.
 #[derive(Clone, Debug)]
 pub(in crate::render) struct PilotPlanner {
     pub guide: Guide,
-    /// The pilot without guide, if it was traced in this run.
-    unguided: Option<PilotSamples>,
 }
 
 impl PilotPlanner {
     /// Of a render that begins.
     pub fn new() -> Self {
-        Self { guide: Guide::new(Aabb::EMPTY, 0.0), unguided: None }
+        Self { guide: Guide::new(Aabb::EMPTY, 0.0) }
     }
 
     /// How many samples per pixel after the first `done` are learned from alike.
@@ -41,16 +39,9 @@ impl PilotPlanner {
         self.guide = self.guide.refined(done);
     }
 
-    /// Takes the pilot without guide, which measures how bright the scene is.
-    pub fn begin(&mut self, unguided: PilotSamples) {
+    /// Sets how bright the scene is, by samples without guide.
+    pub fn begin(&mut self, unguided: &PilotSamples) {
         self.guide.set_typical(unguided.mean() as f32);
-        self.unguided = Some(unguided);
-    }
-
-    /// Traces the pilot with the guide; the result are the samples without and with it.
-    pub fn compare(&mut self, pilot: &GuidingPilot) -> [PilotSamples; 2] {
-        let unguided = self.unguided.take().unwrap_or_else(|| pilot.unguided());
-        [unguided, pilot.guided(&self.guide)]
     }
 
     /// The guide, to be used from now on.

@@ -288,12 +288,13 @@ pub struct RenderArgs {
     pub caustics: Option<CausticsDesc>,
     /// Path guiding: sample directions by the incident radiance learned from earlier paths
     ///
-    /// For scenes whose light comes by few ways, such as through a door ajar. auto: if a pilot finds after four samples
-    /// per pixel that it lowers the error more than it costs; never below 64 samples per pixel, with --target-error,
-    /// with --shard or with photons. on: from the second sample on, as long as it pays. Iterations double; each is
-    /// guided by the samples of those before, and weighted by its inverse variance. With --checkpoint and --resume the
-    /// picture is the same bit for bit. on is unsupported with --shard: each part would have to render nearly all
-    /// samples to train the guide; --guide uses a trained one. Without NAME: on. Default: the scene's setting, or off
+    /// For scenes whose light comes by few ways, such as through a door ajar. auto: if a pilot, and samples with and
+    /// without it, show that it lowers the error by more than it costs; never below 128 samples per pixel, with
+    /// --target-error, with --shard or with photons. on: from the second sample on, as long as it pays. Iterations
+    /// double; each is guided by the samples of those before, and weighted by its inverse variance. With --checkpoint
+    /// and --resume the picture is the same bit for bit. on is unsupported with --shard: each part would have to render
+    /// nearly all samples to train the guide; --guide uses a trained one. Without NAME: on. Default: the scene's
+    /// setting, or auto
     #[
         arg(
             long, value_name = "NAME", num_args = 0..=1, default_missing_value = "on",

@@ -95,6 +95,7 @@ fn run(settings: &Settings, world: &World, to: u32) -> Option<Vec<Checkpoint>> {
             guidance: Guidance::default(),
             caustics: None,
             continuations: None,
+            light_samples: 1,
         },
         Workspace::default(),
     );
