@@ -41,7 +41,7 @@ const MAX_LIGHT_SAMPLES: u32 = 4;
 /// Rays that are left of a sample when roulette ends paths, about: from half of them to all.
 const RAYS_WITH_ROULETTE: f64 = 0.7;
 
-/// What varies over a pixel, which the pilot does not see and lights do not lower, over the variance that it sees.
+/// Variance over the area of a pixel, which is not in that of the pilot and not lowered by more lights, over the latter.
 const VARIANCE_OF_PIXELS: f64 = 0.15;
 
 /// More than one are sampled only if variance times rays is less than this part of that with one.
