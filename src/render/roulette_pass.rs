@@ -41,7 +41,8 @@ const MAX_LIGHT_SAMPLES: u32 = 4;
 /// Rays that are left of a sample when roulette ends paths, about: from half of them to all.
 const RAYS_WITH_ROULETTE: f64 = 0.7;
 
-/// Variance over the area of a pixel, which is not in that of the pilot and not lowered by more lights, over the latter.
+/// Variance over the area of a pixel, over the variance that the pilot measures, which does not include it. More lights
+/// do not lower it.
 const VARIANCE_OF_PIXELS: f64 = 0.15;
 
 /// More than one are sampled only if variance times rays is less than this part of that with one.
