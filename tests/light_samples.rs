@@ -70,6 +70,22 @@ fn the_mean_is_that_of_one_light() {
     assert_blocks_agree(&chosen, &one, "chosen by the pilot");
 }
 
+/// First vertices are within the fog for about half of the paths, and others see the lamps through it.
+#[test]
+fn the_mean_in_a_medium_is_that_of_one_light() {
+    let blocks = |light_samples: u32, seeds: std::ops::Range<u64>| -> Vec<Vec<f64>> {
+        let integrator = json!({ "type": "path", "max_depth": 4, "light_samples": light_samples, "roulette": "off" });
+        let mut scene = yard(integrator);
+        scene["media"] = json!({ "fog": {
+            "absorption": 0.02, "scattering": 0.2, "phase": { "type": "henyey_greenstein", "g": 0.5 }
+        } });
+        (scene["medium"], scene["lights"]) = (json!("fog"), json!([]));
+        let render = |seed| render_with(&prepare(&scene, &overrides(seed, 16)), AccelKind::EMBREE);
+        seeds.map(|seed| block_means(&render(seed).image)).collect()
+    };
+    assert_blocks_agree(&blocks(4, 100..108), &blocks(1, 0..8), "in fog");
+}
+
 /// Each vertex that the camera sees has as many shadow rays, and no other.
 #[test]
 fn first_vertices_alone_have_more_shadow_rays() {

@@ -1,7 +1,8 @@
 //! Weights that combine sampling strategies.
 
 /// Veach's power heuristic with exponent 2: the weight of a strategy of density `pdf` against one of density `other`,
-/// one sample each. A density of infinity (a delta) takes all the weight.
+/// one sample each; with several, the densities are multiplied by their numbers. A density of infinity (a delta) takes
+/// all the weight.
 #[inline(always)]
 pub fn power_heuristic(pdf: f32, other: f32) -> f32 {
     if pdf <= 0.0 {

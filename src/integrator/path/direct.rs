@@ -58,11 +58,12 @@ fn sample_once(context: &Context, regions: Option<&Regions>, wave: &mut Wave, bl
         guided.mix_light_pdfs(regions, vertices);
     }
     let Vertices { rows, points, light_samples: lights, light_evals: evals, direct, u_bsdf, .. } = &mut *vertices;
-    let is_mis = context.config.strategy == Strategy::Mis;
+    let mis = context.config.strategy == Strategy::Mis;
+    let weighting = Weighting { mis, light_samples: context.light_samples() as f32 };
     if context.scene.features.normal_perturbations {
-        vectorize!(illuminate::<true>(rows, points, lights, evals, direct, is_mis, count));
+        vectorize!(illuminate::<true>(rows, points, lights, evals, direct, weighting, count));
     } else {
-        vectorize!(illuminate::<false>(rows, points, lights, evals, direct, is_mis, count));
+        vectorize!(illuminate::<false>(rows, points, lights, evals, direct, weighting, count));
     }
     if let Some(grid) = context.pass.continuations {
         vectorize!(play_roulette(grid, rows, direct, u_bsdf, count));
@@ -103,6 +104,15 @@ fn choose_lights(context: &Context, vertices: &mut Vertices, queue: &mut LightQu
     }
 }
 
+/// How light samples are weighted.
+#[derive(Clone, Copy)]
+struct Weighting {
+    /// Against the density of the BSDF.
+    mis: bool,
+    /// How many each vertex has.
+    light_samples: f32,
+}
+
 #[inline(always)]
 fn illuminate<const PERTURBED: bool>(
     rows: &VertexRows,
@@ -110,7 +120,7 @@ fn illuminate<const PERTURBED: bool>(
     lights: &LightSampleRows,
     evals: &EvalRows,
     direct: &mut DirectRows,
-    is_mis: bool,
+    weighting: Weighting,
     count: usize,
 ) {
     for i in 0..count.min(BATCH) {
@@ -120,7 +130,8 @@ fn illuminate<const PERTURBED: bool>(
         let test = HemisphereTest::new([rows.wo.0[2][i], cos_local], [rows.cos_geometric[i], cos]);
         let factor = shadowing::<PERTURBED>(test, [cos, cos_local, rows.cos_normals[i]]);
         let pdf = lights.pdf[i];
-        let weight = if is_mis & (lights.is_delta[i] == 0) { power_heuristic(pdf, evals.pdf[i]) } else { 1.0 };
+        let is_weighted = weighting.mis & (lights.is_delta[i] == 0);
+        let weight = if is_weighted { power_heuristic(weighting.light_samples * pdf, evals.pdf[i]) } else { 1.0 };
         let value = evals.value.get(i) * factor;
         let contribution = rows.throughput.get(i) * value * lights.radiance.get(i) * (weight / pdf);
         direct.contribution.set(i, contribution);

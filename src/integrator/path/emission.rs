@@ -33,7 +33,7 @@ pub(super) fn bsdf_mis_weight(
     }
     let light_pdf = || light_pdf(&from);
     match context.config.strategy {
-        Strategy::Mis => power_heuristic(paths.pdf[i], light_pdf()),
+        Strategy::Mis => power_heuristic(paths.pdf[i], context.last_light_samples() as f32 * light_pdf()),
         Strategy::Light => 0.0,
         Strategy::Bsdf => 1.0,
     }

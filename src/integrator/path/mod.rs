@@ -91,7 +91,16 @@ struct Context<'a> {
 impl Context<'_> {
     /// How many lights are sampled at each vertex.
     fn light_samples(&self) -> u32 {
-        if self.bounce == 0 { self.pass.light_samples } else { 1 }
+        self.light_samples_at(self.bounce)
+    }
+
+    /// How many lights were sampled at the vertices before, which the rays that are traced come from.
+    fn last_light_samples(&self) -> u32 {
+        self.light_samples_at(self.bounce.wrapping_sub(1))
+    }
+
+    fn light_samples_at(&self, bounce: u32) -> u32 {
+        if bounce == 0 { self.pass.light_samples } else { 1 }
     }
 
     /// Whether any AOV of surfaces is requested.
