@@ -13,6 +13,9 @@ const FLOOR: f64 = 0.01;
 /// By this factor weights may change from one iteration to the next.
 const MAX_CHANGE: f64 = 32.0;
 
+/// The part of the blocks, those with the most variance, that [`Gain::typical`] leaves out: few bright paths decide theirs.
+const ATYPICAL: f64 = 0.05;
+
 /// Variance of a sample, by channel, mean over the pixels of a block.
 type BlockVariances = Vec<[f64; 3]>;
 
@@ -23,6 +26,19 @@ struct IterationStatistics {
     variances: Vec<BlockVariances>,
     /// Rays of a sample.
     rays: f64,
+}
+
+/// Variance times rays of the first iteration over that of another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Gain {
+    /// Of the picture.
+    pub all: f64,
+    /// Of the blocks of pixels with less variance, in each iteration apart.
+    pub typical: f64,
+}
+
+impl Gain {
+    const NONE: Self = Self { all: 1.0, typical: 1.0 };
 }
 
 /// The weights of the samples of the last iteration.
@@ -80,10 +96,18 @@ fn common_means(a: &FilmTile, b: &FilmTile, part: f64) -> Vec<[f64; 3]> {
     block_means(a).into_iter().zip(block_means(b)).map(both).collect()
 }
 
-/// Sum of the blocks' variances over the squares of their colours.
-fn relative(variances: &BlockVariances, colors: &[[f64; 3]]) -> f64 {
-    let of_block = |(v, c): (&[f64; 3], &[f64; 3])| (0..3).map(|k| v[k] / (c[k] * c[k] + FLOOR)).sum::<f64>();
-    variances.iter().zip(colors).map(of_block).sum()
+/// The blocks' variances over the squares of their colours.
+fn relative(variances: &BlockVariances, colors: &[[f64; 3]]) -> Vec<f64> {
+    let of_block = |(v, c): (&[f64; 3], &[f64; 3])| (0..3).map(|k| v[k] / (c[k] * c[k] + FLOOR)).sum();
+    variances.iter().zip(colors).map(of_block).collect()
+}
+
+/// Sum of the values without the [`ATYPICAL`] part that is largest.
+fn typical(by_tile: &[Vec<f64>]) -> f64 {
+    let mut values = by_tile.concat();
+    values.sort_unstable_by(f64::total_cmp);
+    let left = values.len() - (ATYPICAL * values.len() as f64) as usize;
+    values[..left].iter().sum()
 }
 
 /// `a / b`, where both are known.
@@ -108,7 +132,7 @@ impl IterationWeights {
     }
 
     /// Adds an iteration of `samples` samples per pixel to the film of those before, `done` together, all with a weight
-    /// of 1 unless `is_weighed`; the result is the variance times rays of the first iteration over that of this one.
+    /// of 1 unless `is_weighed`; the result is what the iteration gains over the first.
     pub fn add(
         &mut self,
         film: &mut Film,
@@ -116,14 +140,14 @@ impl IterationWeights {
         [samples, done]: [u32; 2],
         rays: u64,
         is_weighed: bool,
-    ) -> f64 {
+    ) -> Gain {
         let variances: Vec<_> = iteration.tiles().iter().map(|tile| block_variances(tile, samples)).collect();
         let pixels = iteration.sampled().area() as f64;
         let statistics = IterationStatistics { variances, rays: rays as f64 / (pixels * f64::from(samples)) };
         let gain = if samples >= 2 {
             self.update(film, iteration, &statistics, f64::from(samples) / f64::from(done))
         } else {
-            1.0
+            Gain::NONE
         };
         for ((tile, other), factor) in film.tiles_mut().iter_mut().zip(iteration.tiles()).zip(&self.factors) {
             if is_weighed {
@@ -141,20 +165,25 @@ impl IterationWeights {
 
     /// Sets the weights of an iteration, which has this part of all samples, by its variance and that of the last one;
     /// the result is its gain over the first.
-    fn update(&mut self, film: &Film, iteration: &Film, statistics: &IterationStatistics, part: f64) -> f64 {
-        let (Some(first), Some(last)) = (&self.first, &self.last) else { return 1.0 };
+    fn update(&mut self, film: &Film, iteration: &Film, statistics: &IterationStatistics, part: f64) -> Gain {
+        let (Some(first), Some(last)) = (&self.first, &self.last) else { return Gain::NONE };
         let colors: Vec<_> =
             film.tiles().iter().zip(iteration.tiles()).map(|(a, b)| common_means(a, b, part)).collect();
-        let by_tile = |statistics: &IterationStatistics| -> Vec<f64> {
+        let by_tile = |statistics: &IterationStatistics| -> Vec<Vec<f64>> {
             statistics.variances.iter().zip(&colors).map(|(variances, colors)| relative(variances, colors)).collect()
         };
-        let (current, before) = (by_tile(statistics), by_tile(last));
-        let total = |sums: &[f64]| sums.iter().sum::<f64>();
-        let (all_current, all_before) = (total(&current), total(&before));
+        let sums = |blocks: &[Vec<f64>]| blocks.iter().map(|tile| tile.iter().sum()).collect::<Vec<f64>>();
+        let [blocks_first, blocks_current] = [first, statistics].map(by_tile);
+        let (current, before) = (sums(&blocks_current), sums(&by_tile(last)));
+        let (all_current, all_before) = (current.iter().sum::<f64>(), before.iter().sum::<f64>());
         for (t, factor) in self.factors.iter_mut().enumerate() {
             *factor *= ratio(all_before - before[t], all_current - current[t]).clamp(1.0 / MAX_CHANGE, MAX_CHANGE);
         }
-        ratio(total(&by_tile(first)) * first.rays, all_current * statistics.rays)
+        let gain = |of_first: f64, of_current: f64| ratio(of_first * first.rays, of_current * statistics.rays);
+        Gain {
+            all: gain(sums(&blocks_first).iter().sum(), all_current),
+            typical: gain(typical(&blocks_first), typical(&blocks_current)),
+        }
     }
 
     /// Writes the weights and what the next ones depend on.
@@ -185,5 +214,19 @@ impl IterationWeights {
             Some(Some(IterationStatistics { variances, rays }))
         };
         Some(Self { factors, first: statistics()?, last: statistics()? })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn typical_blocks_are_those_without_the_largest_values() {
+        let tiles = [vec![1.0; 30], vec![1e6, 2.0], vec![1.0; 8]];
+        // Of 40 blocks two are left out.
+        assert_eq!(typical(&tiles), 38.0);
+        assert_eq!(typical(&[vec![3.0, 5.0]]), 8.0);
+        assert_eq!(typical(&[]), 0.0);
     }
 }
