@@ -13,7 +13,8 @@ const FLOOR: f64 = 0.01;
 /// By this factor weights may change from one iteration to the next.
 const MAX_CHANGE: f64 = 32.0;
 
-/// The part of the blocks, those with the most variance, that [`Gain::typical`] leaves out: few bright paths decide theirs.
+/// The part of the blocks, those with the most variance, that [`Gain::typical`] leaves out: few bright paths decide
+/// theirs.
 const ATYPICAL: f64 = 0.05;
 
 /// Variance of a sample, by channel, mean over the pixels of a block.
