@@ -20,7 +20,7 @@ const MIN_GAINS: [(u32, f64); 2] = [(8, 1.2), (16, GUIDED_COST)];
 const MIN_COMPARED_GAIN: f64 = 2.2;
 
 /// The same of the pixels without the most noise: where they lose, the gain is but that of rare bright paths.
-const MIN_TYPICAL_GAIN: f64 = 0.9;
+const MIN_TRIMMED_GAIN: f64 = 0.9;
 
 /// Time of a ray of a guided path over that of another, about, learning included: from 1.2 under many lights to 1.9 in
 /// a Cornell box.
@@ -31,7 +31,7 @@ fn is_worth_it(training: Training, samples: u32, done: u32, gain: Gain) -> bool 
     match training {
         Training::HalfOfSamples => MIN_GAINS.iter().all(|&(least, min_gain)| samples < least || gain.all >= min_gain),
         Training::FixedNumber => {
-            let pays = gain.all >= MIN_COMPARED_GAIN && gain.typical >= MIN_TYPICAL_GAIN;
+            let pays = gain.all >= MIN_COMPARED_GAIN && gain.trimmed >= MIN_TRIMMED_GAIN;
             pays || !training.is_compared(done)
         }
     }
@@ -134,10 +134,10 @@ impl GuidedPlanner {
         if let Some(guide) = &self.guide {
             let (leaves, nodes) = (guide.leaves(), guide.directional_nodes());
             tracing::debug!(
-                "guided: iteration of {samples} samples, {:.2} times as good as the first ({:.2} of typical blocks); \
+                "guided: iteration of {samples} samples, {:.2} times as good as the first ({:.2} trimmed); \
                  {leaves} leaves, {nodes} nodes",
                 gain.all,
-                gain.typical
+                gain.trimmed
             );
         }
         if self.merged > 0 && !is_worth_it(self.training, samples, done, gain) && self.guide.take().is_some() {
@@ -202,15 +202,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn guiding_goes_on_where_typical_pixels_do_not_lose_either() {
-        let goes_on = |all, typical| is_worth_it(Training::FixedNumber, 4, 12, Gain { all, typical });
+    fn guiding_goes_on_where_the_trimmed_variance_does_not_grow_either() {
+        let goes_on = |all, trimmed| is_worth_it(Training::FixedNumber, 4, 12, Gain { all, trimmed });
         // A room behind a door ajar, Veach's room of lamps and glass.
         assert!(goes_on(3.15, 2.21) && goes_on(5.19, 1.79) && goes_on(3.51, 1.04));
         // A Cornell box, and one with a dragon of glass, where the gain is that of caustics met by chance.
         assert!(!goes_on(1.6, 1.47) && !goes_on(3.29, 0.78) && !goes_on(1.92, 0.06));
         // Samples without guide are not compared with each other.
-        assert!(is_worth_it(Training::FixedNumber, 4, 8, Gain { all: 0.5, typical: 0.5 }));
-        let by_request = |samples, all| is_worth_it(Training::HalfOfSamples, samples, 16, Gain { all, typical: 0.1 });
+        assert!(is_worth_it(Training::FixedNumber, 4, 8, Gain { all: 0.5, trimmed: 0.5 }));
+        let by_request = |samples, all| is_worth_it(Training::HalfOfSamples, samples, 16, Gain { all, trimmed: 0.1 });
         assert!(by_request(4, 0.5) && by_request(8, 1.3) && !by_request(8, 1.1) && !by_request(16, 1.8));
     }
 }

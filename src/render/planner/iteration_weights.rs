@@ -13,9 +13,9 @@ const FLOOR: f64 = 0.01;
 /// By this factor weights may change from one iteration to the next.
 const MAX_CHANGE: f64 = 32.0;
 
-/// The part of the blocks, those with the most variance, that [`Gain::typical`] leaves out: few bright paths decide
+/// The part of the blocks, those with the most variance, that [`Gain::trimmed`] leaves out: few bright paths decide
 /// theirs.
-const ATYPICAL: f64 = 0.05;
+const TRIMMED_PART: f64 = 0.05;
 
 /// Variance of a sample, by channel, mean over the pixels of a block.
 type BlockVariances = Vec<[f64; 3]>;
@@ -34,12 +34,12 @@ struct IterationStatistics {
 pub(super) struct Gain {
     /// Of the picture.
     pub all: f64,
-    /// Of the blocks of pixels with less variance, in each iteration apart.
-    pub typical: f64,
+    /// Without the blocks of pixels with the most variance, in each iteration apart.
+    pub trimmed: f64,
 }
 
 impl Gain {
-    const NONE: Self = Self { all: 1.0, typical: 1.0 };
+    const NONE: Self = Self { all: 1.0, trimmed: 1.0 };
 }
 
 /// The weights of the samples of the last iteration.
@@ -103,11 +103,11 @@ fn relative(variances: &BlockVariances, colors: &[[f64; 3]]) -> Vec<f64> {
     variances.iter().zip(colors).map(of_block).collect()
 }
 
-/// Sum of the values without the [`ATYPICAL`] part that is largest.
-fn typical(by_tile: &[Vec<f64>]) -> f64 {
+/// Sum of the values without the [`TRIMMED_PART`] part that is largest.
+fn trimmed_sum(by_tile: &[Vec<f64>]) -> f64 {
     let mut values = by_tile.concat();
     values.sort_unstable_by(f64::total_cmp);
-    let left = values.len() - (ATYPICAL * values.len() as f64) as usize;
+    let left = values.len() - (TRIMMED_PART * values.len() as f64) as usize;
     values[..left].iter().sum()
 }
 
@@ -183,7 +183,7 @@ impl IterationWeights {
         let gain = |of_first: f64, of_current: f64| ratio(of_first * first.rays, of_current * statistics.rays);
         Gain {
             all: gain(sums(&blocks_first).iter().sum(), all_current),
-            typical: gain(typical(&blocks_first), typical(&blocks_current)),
+            trimmed: gain(trimmed_sum(&blocks_first), trimmed_sum(&blocks_current)),
         }
     }
 
@@ -223,11 +223,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn typical_blocks_are_those_without_the_largest_values() {
+    fn a_trimmed_sum_lacks_the_largest_values() {
         let tiles = [vec![1.0; 30], vec![1e6, 2.0], vec![1.0; 8]];
         // Of 40 blocks two are left out.
-        assert_eq!(typical(&tiles), 38.0);
-        assert_eq!(typical(&[vec![3.0, 5.0]]), 8.0);
-        assert_eq!(typical(&[]), 0.0);
+        assert_eq!(trimmed_sum(&tiles), 38.0);
+        assert_eq!(trimmed_sum(&[vec![3.0, 5.0]]), 8.0);
+        assert_eq!(trimmed_sum(&[]), 0.0);
     }
 }
