@@ -1,10 +1,10 @@
-//! Embree answers alike alone, in packets and from many threads.
+//! Embree, alone and beside packets, answers alike for single rays, in batches and from many threads.
 
-use steradian::internal::accel::{Accelerator, Coherence, EmbreeAccel, EmbreeInfo};
-use steradian::internal::geometry::{Geometry, Shape};
+use steradian::internal::accel::{AccelKind, Accelerator, Coherence, EmbreeAccel, EmbreeInfo, HybridAccel, build};
+use steradian::internal::geometry::{Analytic, Geometry, Shape};
 use steradian::internal::math::DVec3;
 
-use crate::util::geometry::{Rng, instances, meshes, placed_analytic_shapes, soup, transform};
+use crate::util::geometry::{Rng, instances, meshes, placed_analytic_shapes, soup, transform, world};
 use crate::util::scenes::{camera_rays, same, scenes, test_rays};
 
 fn embree(geometry: &Geometry) -> EmbreeAccel<'_> {
@@ -13,8 +13,9 @@ fn embree(geometry: &Geometry) -> EmbreeAccel<'_> {
 
 #[test]
 fn packets_answer_as_single_rays_do() {
-    for (name, geometry) in &scenes() {
-        let accel = embree(geometry);
+    let kinds = [AccelKind::EMBREE, AccelKind::Hybrid];
+    for ((name, geometry), kind) in scenes().iter().flat_map(|scene| kinds.map(|kind| (scene, kind))) {
+        let accel = build(kind, geometry, 1).expect("it builds");
         let rays = camera_rays(geometry, 128);
         // Every length of the last run.
         for count in (rays.len() - 17..=rays.len()).chain(0..18) {
@@ -37,14 +38,15 @@ fn packets_answer_as_single_rays_do() {
 #[test]
 fn incoherent_batches_equal_single_rays_bit_for_bit() {
     let mut rng = Rng::new(15);
-    for (name, geometry) in &scenes() {
-        let accel = embree(geometry);
+    let kinds = [AccelKind::EMBREE, AccelKind::Hybrid];
+    for ((name, geometry), kind) in scenes().iter().flat_map(|scene| kinds.map(|kind| (scene, kind))) {
+        let accel = build(kind, geometry, 1).expect("it builds");
         let rays = test_rays(&mut rng, geometry, 5_001);
         let (mut hits, mut occluded) = (vec![None; rays.len()], vec![false; rays.len()]);
         accel.intersect_batch(&rays, &mut hits, Coherence::Incoherent);
         accel.occluded_batch(&rays, &mut occluded, Coherence::Incoherent);
         for (i, ray) in rays.iter().enumerate() {
-            assert_eq!((hits[i], occluded[i]), (accel.intersect(ray), accel.occluded(ray)), "{name}");
+            assert_eq!((hits[i], occluded[i]), (accel.intersect(ray), accel.occluded(ray)), "{name} {kind}");
         }
     }
 }
@@ -72,6 +74,46 @@ fn many_threads_get_the_answers_of_one() {
             assert!(other.join().expect("no thread panics") == alone);
         }
     });
+}
+
+#[test]
+fn shapes_in_packets_are_hit_where_embree_hits_them() {
+    let mut rng = Rng::new(18);
+    let mut shapes = placed_analytic_shapes(&mut rng, DVec3::ZERO);
+    shapes.push(Shape::Mesh(soup(&mut rng, 2_000, 0.1)));
+    let geometry = world(shapes);
+    let (hybrid, embree) = (HybridAccel::new(&geometry, 1).expect("it builds"), embree(&geometry));
+    assert!(hybrid.description().contains("packets"), "{}", hybrid.description());
+    let rays = test_rays(&mut rng, &geometry, 20_000);
+    let (mut hits, mut occluded) = (vec![None; rays.len()], vec![false; rays.len()]);
+    hybrid.intersect_batch(&rays, &mut hits, Coherence::Incoherent);
+    hybrid.occluded_batch(&rays, &mut occluded, Coherence::Incoherent);
+    let mut on_shapes = 0;
+    for ((ray, hit), occluded) in rays.iter().zip(hits).zip(occluded) {
+        let expected = embree.intersect(ray);
+        assert_eq!((hit.is_some(), occluded), (expected.is_some(), expected.is_some()), "{ray:?}");
+        if let (Some(a), Some(b)) = (&hit, &expected) {
+            assert!(same(&geometry, ray, a, b), "{a:?} is not {b:?}");
+            on_shapes += usize::from(matches!(geometry.shape(a.shape), Shape::Analytic(_)));
+        }
+    }
+    assert!(on_shapes > 1_000, "{on_shapes}");
+}
+
+#[test]
+fn few_analytic_shapes_beside_many_triangles_are_traced_in_packets() {
+    let mut rng = Rng::new(19);
+    let mesh = Shape::Mesh(soup(&mut rng, 2_000, 0.1));
+    let is_quad = |shape: &Shape| matches!(shape, Shape::Analytic(placed) if matches!(placed.shape, Analytic::Quad(_)));
+    let quad = placed_analytic_shapes(&mut rng, DVec3::ZERO).into_iter().find(is_quad).expect("there is one");
+    let beside = |count: usize, mesh: &Shape| {
+        let shapes = std::iter::repeat_n(quad.clone(), count).chain([mesh.clone()]).collect();
+        build(AccelKind::Auto, &world(shapes), 1).expect("it builds").description()
+    };
+    assert!(beside(1, &mesh).contains("1 analytic") && beside(16, &mesh).contains("16 analytic"));
+    assert!(!beside(0, &mesh).contains("packets") && !beside(17, &mesh).contains("packets"));
+    let inside = instances(vec![quad.clone(), mesh], &[transform(rng.rotation(), rng.cube())]);
+    assert!(!build(AccelKind::Auto, &inside, 1).expect("it builds").description().contains("packets"));
 }
 
 #[test]

@@ -9,7 +9,7 @@ use super::bvh::{Bvh, BvhOptions};
 use super::kdtree::{KdTree, KdTreeOptions};
 use super::octree::Octree;
 use super::tree::TwoLevel;
-use super::{Accelerator, EmbreeAccel, EmbreeOptions, EmbreeQuality, LinearAccel, PacketBvh};
+use super::{Accelerator, EmbreeAccel, EmbreeOptions, EmbreeQuality, HybridAccel, LinearAccel, PacketBvh};
 use crate::error::Result;
 use crate::geometry::Geometry;
 
@@ -18,7 +18,8 @@ use crate::geometry::Geometry;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum AccelKind {
-    /// [`Packets`](Self::Packets) for scenes of few primitives at rest, else Embree.
+    /// [`Packets`](Self::Packets) for scenes of few primitives at rest, [`Hybrid`](Self::Hybrid) where few analytic
+    /// shapes stand among others, else Embree.
     #[default]
     Auto,
     /// Embree.
@@ -27,6 +28,8 @@ pub enum AccelKind {
     Bvh(BvhOptions),
     /// A bounding volume hierarchy for packets of rays.
     Packets,
+    /// Embree, and a bounding volume hierarchy for packets of rays over analytic shapes of the world.
+    Hybrid,
     /// A kd-tree.
     KdTree(KdTreeOptions),
     /// An octree.
@@ -41,24 +44,30 @@ impl AccelKind {
         Self::Embree(EmbreeOptions { quality: EmbreeQuality::Medium, robust: true, compact: false });
 
     /// Every structure with default options, with the name users choose it by.
-    pub const ALL: [(Self, &'static str); 6] = [
+    pub const ALL: [(Self, &'static str); 7] = [
         (Self::EMBREE, "embree"),
         (Self::Bvh(BvhOptions { binary: false }), "bvh"),
         (Self::KdTree(KdTreeOptions { median: false }), "kdtree"),
         (Self::Octree, "octree"),
         (Self::Linear, "linear"),
         (Self::Packets, "packets"),
+        (Self::Hybrid, "hybrid"),
     ];
 
     /// Every kind and every option, with what it is.
     pub const CHOICES: &'static [(&'static str, &'static str)] = &[
-        ("auto", "packets for at most 40 primitives beside spheres and cylinders, at rest, without holes; else embree"),
+        (
+            "auto",
+            "packets for at most 40 primitives beside spheres and cylinders, at rest, without holes; hybrid for at \
+             most 16 analytic shapes beside others; else embree",
+        ),
         ("embree", "Embree: fastest for large scenes; build quality medium, robust"),
         ("embree:low", "built faster, traced slower"),
         ("embree:high", "spatial splits: built slower, traced faster"),
         ("embree:fast", "not robust: rays may slip through edges; for comparisons"),
         ("embree:compact", "less memory, traced slower"),
         ("packets", "bounding volume hierarchy traversed by up to 16 rays at once: fastest for few primitives"),
+        ("hybrid", "embree, with packets for spheres, cylinders, disks and quads that have no holes"),
         ("bvh", "bounding volume hierarchy: binned surface area heuristic, eight boxes a node, SIMD"),
         ("bvh:binary", "two boxes a node, no SIMD"),
         ("kdtree", "kd-tree: surface area heuristic with a bonus for empty space"),
@@ -82,6 +91,7 @@ impl fmt::Display for AccelKind {
             }
             Self::Auto => ("auto", Vec::new()),
             Self::Packets => ("packets", Vec::new()),
+            Self::Hybrid => ("hybrid", Vec::new()),
             Self::Bvh(o) => {
                 let flags = [o.binary.then_some("binary")];
                 ("bvh", flags.into_iter().flatten().collect())
@@ -156,9 +166,11 @@ impl TryFrom<String> for AccelKind {
 pub fn build(kind: AccelKind, geometry: &Geometry, threads: usize) -> Result<Box<dyn Accelerator + '_>> {
     Ok(match kind {
         AccelKind::Auto if PacketBvh::suits(geometry) => Box::new(PacketBvh::new(geometry, threads)),
+        AccelKind::Auto if HybridAccel::suits(geometry) => Box::new(HybridAccel::new(geometry, threads)?),
         AccelKind::Auto => build(AccelKind::EMBREE, geometry, threads)?,
         AccelKind::Embree(options) => Box::new(EmbreeAccel::with_options(geometry, threads, options)?),
         AccelKind::Packets => Box::new(PacketBvh::new(geometry, threads)),
+        AccelKind::Hybrid => Box::new(HybridAccel::new(geometry, threads)?),
         AccelKind::Bvh(options) => Box::new(TwoLevel::<Bvh>::new(geometry, &options, threads)),
         AccelKind::KdTree(options) => Box::new(TwoLevel::<KdTree>::new(geometry, &options, threads)),
         AccelKind::Octree => Box::new(TwoLevel::<Octree>::new(geometry, &(), threads)),
@@ -186,7 +198,7 @@ mod tests {
     fn other_names_are_refused_with_those_there_are() {
         for name in ["", "embre", "embree:", "embree:hi", "bvh:median", "auto:high", "linear:fast", "octree:"] {
             let error = name.parse::<AccelKind>().unwrap_err().to_string();
-            assert!(error.contains("auto, embree, bvh, kdtree, octree, linear, packets"), "{error}");
+            assert!(error.contains("auto, embree, bvh, kdtree, octree, linear, packets, hybrid"), "{error}");
         }
     }
 }

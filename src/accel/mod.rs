@@ -2,6 +2,7 @@
 
 mod bvh;
 mod embree;
+mod hybrid;
 pub mod inspect;
 mod kdtree;
 mod kind;
@@ -15,6 +16,7 @@ pub use bvh::BvhOptions;
 pub use embree::EmbreeReplay;
 pub use embree::Registered;
 pub use embree::{EmbreeAccel, EmbreeInfo, EmbreeOptions, EmbreeQuality, on_uncaught_exception};
+pub use hybrid::HybridAccel;
 pub use kdtree::KdTreeOptions;
 pub use kind::{AccelKind, UnknownAccel, build};
 pub use linear::LinearAccel;

@@ -446,12 +446,12 @@ fn work_per_ray(inspect: &dyn Inspect, rays: &[Ray], any_hit: bool) -> [f64; 2] 
     [work.nodes, work.prims].map(|n| n as f64 / rays.len().max(1) as f64)
 }
 
-/// The queries of an accelerator. Only Embree traces the rays of a batch in packets.
+/// The queries of an accelerator: batches where it traces their rays in packets, coherent ones where Embree gets them.
 fn modes(kind: RayKind, accel: &str) -> &'static [Mode] {
-    match (accel.starts_with("embree"), kind) {
-        (true, RayKind::Camera) => &[Mode::Single, Mode::Batch, Mode::CoherentBatch],
-        (true, _) => &[Mode::Single, Mode::Batch],
-        (false, _) => &[Mode::Single],
+    match (accel.split(':').next(), kind) {
+        (Some("auto" | "embree" | "hybrid"), RayKind::Camera) => &[Mode::Single, Mode::Batch, Mode::CoherentBatch],
+        (Some("auto" | "embree" | "hybrid" | "packets"), _) => &[Mode::Single, Mode::Batch],
+        _ => &[Mode::Single],
     }
 }
 

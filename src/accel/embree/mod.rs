@@ -111,6 +111,16 @@ impl<'g> EmbreeAccel<'g> {
     /// # Errors
     /// As there.
     pub fn with_options(geometry: &'g Geometry, threads: usize, options: EmbreeOptions) -> Result<Self> {
+        Self::over(geometry, &geometry.world, threads, options)
+    }
+
+    /// [`with_options`](Self::with_options) over some of the shapes of the world, and all instances.
+    pub(super) fn over(
+        geometry: &'g Geometry,
+        world_shapes: &[ShapeId],
+        threads: usize,
+        options: EmbreeOptions,
+    ) -> Result<Self> {
         let gate = RayLimits::for_instances(&geometry.instances)?;
         let device = Device::new(threads)?;
         let user_shapes = UserShapes::new(geometry);
@@ -118,7 +128,7 @@ impl<'g> EmbreeAccel<'g> {
         let objects = object_scenes(geometry, &device, &shapes, options)?;
         let entered = UserInstances::new(geometry, &objects);
         let mut world = SceneBuilder::new(&device, options)?;
-        scene::attach_shapes(&mut world, &shapes, &geometry.world, |_, id| id.index())?;
+        scene::attach_shapes(&mut world, &shapes, world_shapes, |_, id| id.index())?;
         attach_instances(&mut world, geometry, &device, &objects, &entered)?;
         // It must be dropped before the user data and the objects' scenes.
         let scene = world.commit()?;

@@ -33,27 +33,26 @@ pub(super) enum NodeContent {
 }
 
 /// A hierarchy over a static world.
-pub(super) struct Hierarchy<'g> {
-    pub geometry: &'g Geometry,
-    pub sphere: BoundingSphere,
+pub(in crate::accel) struct Hierarchy<'g> {
+    pub(super) geometry: &'g Geometry,
+    pub(super) sphere: BoundingSphere,
     /// The root first.
-    pub nodes: Vec<Node>,
-    pub primitives: Vec<Primitive<'g>>,
+    pub(super) nodes: Vec<Node>,
+    pub(super) primitives: Vec<Primitive<'g>>,
     /// Whether some are analytic shapes.
-    pub has_shapes: bool,
+    pub(super) has_shapes: bool,
     /// By number: triangles of a quadrilateral follow each other.
-    pub prims: Vec<PrimRecord>,
+    pub(super) prims: Vec<PrimRecord>,
 }
 
 /// The most entries that wait on the stack: one a level.
 pub(super) const STACK: usize = 96;
 
 impl<'g> Hierarchy<'g> {
-    /// Over the shapes of the world; `None` if there is nothing to hit.
-    pub fn new(geometry: &'g Geometry) -> Option<Self> {
-        let items = Items::of_world(geometry, &[]);
-        let all = items.all_bounds();
-        let sphere = BoundingSphere { center: all.center(), radius: (0.5 * all.size()).length() };
+    /// Over shapes of the world, for rays through the world of these bounds; `None` if there is nothing to hit.
+    pub fn new(geometry: &'g Geometry, shapes: &[ShapeId], world: &Aabb) -> Option<Self> {
+        let items = Items::of_shapes(geometry, shapes);
+        let sphere = BoundingSphere { center: world.center(), radius: (0.5 * world.size()).length() };
         if items.len() == 0 || !(sphere.radius > 0.0) || !sphere.rounding().is_finite() {
             return None;
         }

@@ -16,7 +16,8 @@ use super::{Accelerator, BvhOptions, Coherence, HitRows, intersect_in_rows};
 use crate::geometry::{Analytic, Geometry, Hit, Shape};
 use crate::math::rows::BATCH;
 use crate::math::{Aabb, Ray, RayRows};
-use hierarchy::Hierarchy;
+pub(super) use hierarchy::Hierarchy;
+pub(super) use shapes::has_intervals;
 
 /// Up to this number of polygons and analytic shapes, packets are faster than Embree (`docs/performance.md`).
 const FEW: usize = 40;
@@ -37,7 +38,7 @@ pub struct PacketBvh<'g> {
 impl<'g> PacketBvh<'g> {
     /// Builds both forms with `threads` threads (0: all).
     pub fn new(geometry: &'g Geometry, threads: usize) -> Self {
-        let packets = is_static(geometry).then(|| Hierarchy::new(geometry));
+        let packets = is_static(geometry).then(|| of_world(geometry));
         Self { single: TwoLevel::new(geometry, &BvhOptions::default(), threads), packets: packets.flatten() }
     }
 
@@ -50,8 +51,13 @@ impl<'g> PacketBvh<'g> {
         prims <= 2 * FEW
             && quadrics.len() <= MANY_QUADRICS
             && is_static(geometry)
-            && Hierarchy::new(geometry).is_some_and(|packets| packets.len() <= FEW + quadrics.len())
+            && of_world(geometry).is_some_and(|packets| packets.len() <= FEW + quadrics.len())
     }
+}
+
+/// The hierarchy over the whole of a static world.
+fn of_world(geometry: &Geometry) -> Option<Hierarchy<'_>> {
+    Hierarchy::new(geometry, &geometry.world, &geometry.bounds())
 }
 
 /// Whether a shape is a sphere or a cylinder.
@@ -97,13 +103,8 @@ impl Accelerator for PacketBvh<'_> {
 
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {
         intersect_in_rows(self, rays, hits, coherence);
-        let Some(packets) = &self.packets else { return };
-        for (ray, hit) in rays.iter().zip(hits) {
-            if let Some(hit) = hit
-                && let Some(t) = packets.exact_distance(hit.shape, ray)
-            {
-                hit.t = t;
-            }
+        if let Some(packets) = &self.packets {
+            packets.set_exact_distances(rays, hits);
         }
     }
 

@@ -54,6 +54,15 @@ enum Bounded {
     Nothing,
 }
 
+/// Whether distances to a shape are bounded in `f32`, so that few are computed in `f64`.
+pub(in crate::accel) fn has_intervals(shape: &Analytic) -> bool {
+    match shape {
+        Analytic::Sphere(_) | Analytic::Quad(_) | Analytic::Disk(_) => true,
+        Analytic::Frustum(frustum) => frustum.radii()[0] == frustum.radii()[1],
+        Analytic::Revolution(_) => false,
+    }
+}
+
 /// Where rays may meet a surface: at distances from `low` to `high` if at all.
 #[derive(Clone, Copy)]
 struct RootInterval<S: Simd> {

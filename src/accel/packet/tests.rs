@@ -141,7 +141,8 @@ fn packets_hit_what_the_oracle_hits() {
 fn answers<S: Simd>(simd: S, packets: &Hierarchy<'_>, rays: &[Ray]) -> (Vec<Option<Hit>>, Vec<bool>) {
     let (rows, count) = (RayRows::of(rays), rays.len());
     let (mut hits, mut occluded) = (HitRows::default(), [false; BATCH]);
-    Closest { hierarchy: packets, rays: &rows, count, hits: &mut hits, alone: |_: &Ray| None }.with_simd(simd);
+    Closest { hierarchy: packets, rays: &rows, count, hits: &mut hits, ends: None, alone: |_: &Ray| None }
+        .with_simd(simd);
     Occluded { hierarchy: packets, rays: &rows, count, occluded: &mut occluded, alone: |_: &Ray| false }
         .with_simd(simd);
     ((0..count).map(|lane| hits.get(lane)).collect(), occluded[..count].to_vec())
@@ -152,7 +153,7 @@ fn answers<S: Simd>(simd: S, packets: &Hierarchy<'_>, rays: &[Ray]) -> (Vec<Opti
 fn every_instruction_set_gives_the_same_bits() {
     let mut random = Sequence(2);
     for geometry in geometries(&mut random) {
-        let packets = Hierarchy::new(&geometry).unwrap();
+        let packets = of_world(&geometry).unwrap();
         for rays in rays(&mut random, &geometry)[..2_000].chunks(100) {
             let alone = answers(Scalar::new(), &packets, rays);
             assert_eq!(answers(V3::try_new().unwrap(), &packets, rays), alone);

@@ -13,13 +13,25 @@ use crate::accel::bvh::MAX_LEAF;
 use crate::geometry::{Hit, PACKET_SIZE, RayPacket, Shape, TransformedShape, TrianglePoints, TriangleRay};
 use crate::id::ShapeId;
 use crate::math::compact::set_bits;
-use crate::math::rows::BATCH;
+use crate::math::rows::{BATCH, Row};
 use crate::math::{Ray, RayRows};
 
 impl Hierarchy<'_> {
     /// Closest hits of the first `count` rays. Rays that do not fit into packets are traced by `alone`.
     pub fn intersect(&self, rays: &RayRows, count: usize, hits: &mut HitRows, alone: impl Fn(&Ray) -> Option<Hit>) {
-        run(Closest { hierarchy: self, rays, count, hits, alone });
+        run(Closest { hierarchy: self, rays, count, hits, ends: None, alone });
+    }
+
+    /// As [`intersect`](Self::intersect), with upper limits of the distances, or the ends of the rays that hit nothing.
+    pub fn intersect_within(
+        &self,
+        rays: &RayRows,
+        count: usize,
+        hits: &mut HitRows,
+        ends: &mut Row,
+        alone: impl Fn(&Ray) -> Option<Hit>,
+    ) {
+        run(Closest { hierarchy: self, rays, count, hits, ends: Some(ends), alone });
     }
 
     /// Whether the first `count` rays hit anything.
@@ -182,6 +194,17 @@ impl Hierarchy<'_> {
         distances
     }
 
+    /// Replaces the distances of hits on analytic shapes by those in `f64`.
+    pub fn set_exact_distances(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        for (ray, hit) in rays.iter().zip(hits) {
+            if let Some(hit) = hit
+                && let Some(t) = self.exact_distance(hit.shape, ray)
+            {
+                hit.t = t;
+            }
+        }
+    }
+
     /// The distance in `f64` at which a ray hits an analytic shape.
     pub fn exact_distance(&self, shape: ShapeId, ray: &Ray) -> Option<f32> {
         match self.geometry.shape(shape) {
@@ -225,6 +248,8 @@ pub(super) struct Closest<'a, F> {
     pub rays: &'a RayRows,
     pub count: usize,
     pub hits: &'a mut HitRows,
+    /// Upper limits of the distances.
+    pub ends: Option<&'a mut Row>,
     pub alone: F,
 }
 
@@ -233,7 +258,7 @@ impl<F: Fn(&Ray) -> Option<Hit>> WithSimd for Closest<'_, F> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { hierarchy, rays, count, hits, alone } = self;
+        let Self { hierarchy, rays, count, hits, mut ends, alone } = self;
         for first in (0..count).step_by(S::F32_LANES) {
             let (mut packet, left_out) = Packet::new(simd, &hierarchy.sphere, rays, first, count - first);
             if hierarchy.has_shapes {
@@ -245,6 +270,9 @@ impl<F: Fn(&Ray) -> Option<Hit>> WithSimd for Closest<'_, F> {
             let reported = if hierarchy.has_shapes { packet.reported } else { packet.t };
             store_f32s(simd, reported, &mut hits.t[first..]);
             store_u32s(simd, packet.prim, &mut hits.shape[first..]);
+            if let Some(ends) = &mut ends {
+                store_f32s(simd, packet.t, &mut ends[first..]);
+            }
             for lane in lanes {
                 let number = hits.shape[lane];
                 if number != NONE {
@@ -252,7 +280,12 @@ impl<F: Fn(&Ray) -> Option<Hit>> WithSimd for Closest<'_, F> {
                 }
             }
             for lane in left_out.lanes() {
-                hits.set(first + lane, alone(&rays.get(first + lane)));
+                let ray = rays.get(first + lane);
+                let hit = alone(&ray);
+                hits.set(first + lane, hit);
+                if let Some(ends) = &mut ends {
+                    ends[first + lane] = hit.map_or(ray.t_max, |hit| hit.t);
+                }
             }
         }
     }

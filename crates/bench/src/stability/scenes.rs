@@ -84,6 +84,11 @@ pub fn packets(geometry: &Geometry) -> Box<dyn Accelerator + '_> {
     Box::new(BatchesOfOne(build(AccelKind::Packets, geometry)))
 }
 
+/// Embree with packets for analytic shapes, also for single rays.
+pub fn hybrid(geometry: &Geometry) -> Box<dyn Accelerator + '_> {
+    Box::new(BatchesOfOne(build(AccelKind::Hybrid, geometry)))
+}
+
 /// What every entry point answers to these rays: single, in coherent batches and in incoherent ones.
 pub fn all_answers(accel: &dyn Accelerator, rays: &[Ray]) -> Vec<(Vec<Option<Hit>>, Vec<bool>)> {
     let mut answers =

@@ -334,7 +334,7 @@ pub struct RenderArgs {
     /// The opposite of --transparent
     #[arg(long, hide = true)]
     pub no_transparent: bool,
-    /// Ray accelerator: auto, embree, packets, bvh, kdtree, octree or linear, with options such as embree:high
+    /// Ray accelerator: auto, embree, packets, hybrid, bvh, kdtree, octree or linear, with options such as embree:high
     #[arg(long, value_name = "NAME", long_help = accel_help(), help_heading = "Algorithm")]
     pub accel: Option<AccelKind>,
 

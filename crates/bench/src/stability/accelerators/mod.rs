@@ -11,7 +11,7 @@ use moving::f8_motion_bounds;
 use visits::f9_visits;
 
 use super::geometry::{Rng, grid, ids, ray, world};
-use super::scenes::{all, at_times, build, moving_scene, own, packets, path_rays, same, scenes, test_rays};
+use super::scenes::{all, at_times, build, hybrid, moving_scene, own, packets, path_rays, same, scenes, test_rays};
 use super::{Effort, Faults, Outcome};
 use crate::accel::{AccelKind, Accelerator, Coherence, LinearAccel};
 use crate::geometry::{Geometry, Hit, Shape};
@@ -122,7 +122,7 @@ fn f1_closest_hits(effort: Effort) -> Outcome {
     let cases = cases(effort.pick(250, 10_000));
     let (mut rays, mut hits, mut poor) = (0, 0, 0);
     let mut counts: Vec<(&str, Faults)> = Vec::new();
-    let mut rounding = [Agreement::default(), Agreement::default()];
+    let mut rounding: [Agreement; 3] = Default::default();
     for Case { geometry, expected } in &cases {
         let found = expected.iter().filter(|(_, hit)| hit.is_some()).count();
         rays += expected.len();
@@ -135,7 +135,8 @@ fn f1_closest_hits(effort: Effort) -> Outcome {
                 None => counts.push((name, lost)),
             }
         }
-        for (sum, accel) in rounding.iter_mut().zip([build(AccelKind::EMBREE, geometry), packets(geometry)]) {
+        let within_rounding = [build(AccelKind::EMBREE, geometry), packets(geometry), hybrid(geometry)];
+        for (sum, accel) in rounding.iter_mut().zip(within_rounding) {
             let Agreement { flags, distances, ties } = Agreement::of(&*accel, geometry, expected);
             sum.flags += flags;
             sum.distances += distances;
@@ -147,12 +148,15 @@ fn f1_closest_hits(effort: Effort) -> Outcome {
     let outcome = counts
         .into_iter()
         .fold(outcome, |outcome, (name, lost)| outcome.none(format!("answers of {name} that differ in a bit"), lost));
-    ["Embree", "packets"].iter().zip(rounding).fold(outcome, |outcome, (name, Agreement { flags, distances, ties })| {
-        outcome
-            .none(format!("distances of {name} beyond their rounding"), distances)
-            .none(format!("rays that only {name}, or only the oracle, says to hit"), flags)
-            .record(format!("other primitives of {name} at the same distance"), ties as f64)
-    })
+    ["Embree", "packets", "hybrid"].iter().zip(rounding).fold(
+        outcome,
+        |outcome, (name, Agreement { flags, distances, ties })| {
+            outcome
+                .none(format!("distances of {name} beyond their rounding"), distances)
+                .none(format!("rays that only {name}, or only the oracle, says to hit"), flags)
+                .record(format!("other primitives of {name} at the same distance"), ties as f64)
+        },
+    )
 }
 
 fn f2_ties(_: Effort) -> Outcome {
