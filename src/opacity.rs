@@ -1,9 +1,14 @@
 //! Opacity: surfaces with holes, by a number or a texture.
 
+use std::collections::HashMap;
+
 use crate::geometry::{AlphaMask, Detail, Hit, Mesh, Shape};
 use crate::id::{PrimId, ShapeId};
 use crate::math::{Ray, Vec2};
 use crate::texture::{Footprint, SolidTable, Solidity, Texture};
+
+/// Places are kept once where so many triangles share each of them.
+const SHARED: usize = 4;
 
 /// How much of each shape is there.
 #[derive(Debug)]
@@ -24,8 +29,12 @@ struct Holes {
 #[derive(Debug)]
 struct ImageHoles {
     table: SolidTable,
-    /// Of each triangle, the [place](SolidTable::place) of its first corner and the differences to those of the others.
+    /// The [place](SolidTable::place) of a triangle's first corner and the differences to those of the others: of each
+    /// triangle, or with `numbers` each that occurs.
     places: Vec<[Vec2; 3]>,
+    /// Of each triangle, the number of its places, where many triangles share them, as those of leaves do: what is read
+    /// at random then stays in the nearest caches.
+    numbers: Option<Vec<u32>>,
 }
 
 impl Opacity {
@@ -80,13 +89,78 @@ impl ImageHoles {
             let corner = at(0.0, 0.0);
             [corner, at(1.0, 0.0) - corner, at(0.0, 1.0) - corner]
         };
-        let places = (0..mesh.triangles().len()).map(of_triangle).collect();
-        Self { table, places }
+        let places: Vec<_> = (0..mesh.triangles().len()).map(of_triangle).collect();
+        let (mut number_of, mut distinct) = (HashMap::new(), Vec::new());
+        let mut number = |place: &[Vec2; 3]| {
+            *number_of.entry(place.map(|v| v.to_array().map(f32::to_bits))).or_insert_with(|| {
+                distinct.push(*place);
+                distinct.len() as u32 - 1
+            })
+        };
+        let numbers: Vec<_> = places.iter().map(&mut number).collect();
+        if SHARED * distinct.len() <= places.len() {
+            Self { table, places: distinct, numbers: Some(numbers) }
+        } else {
+            Self { table, places, numbers: None }
+        }
     }
 
     #[inline(always)]
     fn at(&self, hit: &Hit) -> Solidity {
-        let [corner, along_u, along_v] = self.places[hit.prim.index()];
+        let number = self.numbers.as_ref().map_or(hit.prim.index(), |numbers| numbers[hit.prim.index()] as usize);
+        let [corner, along_u, along_v] = self.places[number];
         self.table.at(corner + along_u * hit.u + along_v * hit.v)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::image_data::{ImageData, Samples};
+    use crate::math::Rng;
+    use crate::texture::{Bitmap, Decoding, TextureImage};
+
+    /// Cards of two triangles with texture coordinates of one of so many kinds.
+    fn cards(count: usize, kinds: usize) -> Mesh {
+        let (mut positions, mut triangles, mut uvs) = (Vec::new(), Vec::new(), Vec::new());
+        for i in 0..count {
+            let first = positions.len() as u32;
+            let at = (i % kinds) as f32 * 0.37;
+            for [u, v] in [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]] {
+                positions.push([u, v, i as f32]);
+                uvs.push([u + at, v - at]);
+            }
+            triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        }
+        Mesh::new(positions, triangles, None, Some(uvs)).unwrap()
+    }
+
+    #[test]
+    fn triangles_that_share_places_are_as_solid_as_their_texture() {
+        let mut rng = Rng::new(5);
+        let samples = (0..64 * 64).map(|_| if rng.unit_f32() < 0.5 { 0 } else { 255 }).collect();
+        let image = ImageData { width: 64, height: 64, channels: 1, samples: Samples::U8(samples) };
+        let bitmap = Bitmap::new(Arc::new(TextureImage::new(image).unwrap()), Decoding::Linear);
+        for (kinds, is_shared) in [(1, true), (10, true), (40, false)] {
+            let shape = Shape::Mesh(cards(40, kinds));
+            let opacity = Opacity::new(std::slice::from_ref(&shape), vec![Some(Texture::Bitmap(bitmap.clone()))]);
+            let holes = opacity.by_shape[0].as_ref().unwrap();
+            assert_eq!(holes.image.as_ref().unwrap().numbers.is_some(), is_shared, "{kinds}");
+            let Shape::Mesh(mesh) = &shape else { panic!("a mesh") };
+            let mut decided = 0;
+            for i in 0..80 * 100 {
+                let (prim, u) = (PrimId(i % 80), 0.5 * rng.unit_f32());
+                let hit =
+                    Hit { t: 1.0, u, v: 0.5 * rng.unit_f32(), shape: ShapeId(0), prim, instance: Hit::NO_INSTANCE };
+                let alpha = opacity.alpha(&shape, &Ray::INACTIVE, &hit);
+                let expected = holes.texture.scalar(mesh.uv(prim, hit.u, hit.v));
+                // Texture coordinates round differently: by 1e-6 of 64 texels.
+                assert!((alpha - expected).abs() < 1e-3, "{kinds}: {hit:?} {alpha} {expected}");
+                decided += u32::from(alpha == 0.0 || alpha == 1.0);
+            }
+            assert!(decided > 500, "{kinds}: {decided}");
+        }
     }
 }

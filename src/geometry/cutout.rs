@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use super::{Detail, Geometry, Hit, Shape};
 use crate::id::ShapeId;
-use crate::math::Ray;
 use crate::math::random::mix_32;
+use crate::math::vectorize::vectorize;
+use crate::math::{Ray, RayRows};
 
 /// Opacity of surfaces, decided stochastically hit by hit during traversal.
 ///
@@ -48,6 +49,14 @@ impl AlphaMasks {
         if self.is_empty() { 0 } else { ray_key(ray) }
     }
 
+    /// [`key`](Self::key) for rays from the lane `first` on.
+    #[inline(always)]
+    pub fn set_keys(&self, rays: &RayRows, first: usize, keys: &mut [u32]) {
+        if !self.is_empty() {
+            vectorize!(set_ray_keys(rays, first, keys));
+        }
+    }
+
     /// Whether a hit of a world-space ray with a shape of `geometry` counts, by these masks.
     pub fn counts_in(&self, geometry: &Geometry, ray: &Ray, hit: &Hit) -> bool {
         if self.is_empty() {
@@ -86,8 +95,22 @@ fn side(shape: &Shape, ray: &Ray, hit: &Hit) -> u32 {
 #[inline(never)]
 fn ray_key(ray: &Ray) -> u32 {
     let words = [ray.origin.x, ray.origin.y, ray.origin.z, ray.direction.x, ray.direction.y, ray.direction.z, ray.time];
-    words.iter().fold(0x9e37_79b9, |hash, word| mix_32(hash ^ word.to_bits()))
+    words.iter().fold(KEY_SEED, |hash, word| mix_32(hash ^ word.to_bits()))
 }
+
+/// [`ray_key`] for rays in rows.
+#[inline(always)]
+fn set_ray_keys(rays: &RayRows, first: usize, keys: &mut [u32]) {
+    keys.fill(KEY_SEED);
+    for row in rays.origin.0.iter().chain(&rays.direction.0).chain([&rays.time]) {
+        for (key, word) in keys.iter_mut().zip(&row[first..]) {
+            *key = mix_32(*key ^ word.to_bits());
+        }
+    }
+}
+
+/// Where the hashes of rays begin.
+const KEY_SEED: u32 = 0x9e37_79b9;
 
 #[inline(never)]
 fn is_covered(coverage: f32, key: u32, hit: &Hit) -> bool {
@@ -104,6 +127,7 @@ mod tests {
     use super::*;
     use crate::id::{InstanceId, PrimId};
     use crate::math::Vec3;
+    use crate::math::vectorize::with_each;
 
     #[test]
     fn hits_count_as_often_as_the_surface_is_there() {
@@ -119,6 +143,19 @@ mod tests {
             // Five standard deviations: false alarm 6e-7; none where the answer is certain.
             let bound = 5.0 * (coverage * (1.0 - coverage) / n as f32).sqrt();
             assert!((fraction - coverage).abs() <= bound, "{coverage}: {fraction}");
+        }
+    }
+
+    #[test]
+    fn keys_in_rows_are_those_of_single_rays() {
+        let rays: Vec<_> =
+            (0..40).map(|i| Ray { time: 0.01 * i as f32, ..Ray::new(Vec3::splat(i as f32), Vec3::Y) }).collect();
+        for keys in with_each!({
+            let mut keys = [0; 16];
+            set_ray_keys(&RayRows::of(&rays), 16, &mut keys);
+            keys
+        }) {
+            assert!(keys.iter().zip(&rays[16..]).all(|(key, ray)| *key == ray_key(ray)));
         }
     }
 

@@ -46,6 +46,8 @@ impl Axis {
         let index = whole.saturating_sub(i32::from(place < whole as f32));
         let cell = match self.wrap {
             Wrap::Clamp => index.clamp(0, self.count - 1),
+            // Most are in the first period; a division takes longer than the rest.
+            Wrap::Repeat if (0..self.period).contains(&index) => index,
             Wrap::Repeat => index.rem_euclid(self.period),
             Wrap::Mirror => {
                 let index = index.rem_euclid(2 * self.period);

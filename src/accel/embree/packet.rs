@@ -246,11 +246,7 @@ pub(super) fn fill(packet: &mut RTCRay16, valid: &mut LaneMask, tracer: &Tracer,
     if !valid.is_full() {
         deactivate(packet, valid);
     }
-    if !tracer.cutouts.is_empty() {
-        for (id, ray) in packet.id.iter_mut().zip(range) {
-            *id = tracer.cutouts.key(&rays.get(ray));
-        }
-    }
+    tracer.cutouts.set_keys(rays, first, &mut packet.id);
 }
 
 #[cold]

@@ -55,11 +55,16 @@ const FAR: DVec3 = DVec3::new(148_376.0, 1_234.0, -223_423.0);
 
 type Named<'g> = (&'static str, Box<dyn Accelerator + 'g>);
 
-/// Every accelerator; the linear one only for few triangles.
+/// Every accelerator but the hybrid one, whose triangles are Embree's; the linear one only for few triangles.
 fn accelerators(geometry: &Geometry) -> Vec<Named<'_>> {
     const FEW: usize = 5_000;
     let prims: usize = geometry.shapes.iter().map(Shape::prim_count).sum();
-    let feasible = AccelKind::ALL.into_iter().filter(|(kind, _)| *kind != AccelKind::Linear || prims <= FEW);
+    let is_feasible = |kind: AccelKind| match kind {
+        AccelKind::Hybrid => false,
+        AccelKind::Linear => prims <= FEW,
+        _ => true,
+    };
+    let feasible = AccelKind::ALL.into_iter().filter(|(kind, _)| is_feasible(*kind));
     feasible.map(|(kind, name)| (name, accel::build(kind, geometry, 1).expect("accelerators build"))).collect()
 }
 
