@@ -95,10 +95,10 @@ impl Hierarchy<'_> {
                         if SHAPES {
                             self.intersect_run::<S, ANY>(simd, run, entering, packet);
                         } else {
-                            run.iter().for_each(
-                                #[inline(always)]
-                                |primitive| self.intersect_polygon::<S, ANY, false>(simd, primitive, packet),
-                            );
+                            // A loop: closures are inlined, and so vector code, only while they have one caller.
+                            for primitive in run {
+                                self.intersect_polygon::<S, ANY, false>(simd, primitive, packet);
+                            }
                         }
                     }
                 }
