@@ -141,8 +141,8 @@ fn packets_hit_what_the_oracle_hits() {
 fn answers<S: Simd>(simd: S, packets: &Hierarchy<'_>, rays: &[Ray]) -> (Vec<Option<Hit>>, Vec<bool>) {
     let (rows, count) = (RayRows::of(rays), rays.len());
     let (mut hits, mut occluded) = (HitRows::default(), [false; BATCH]);
-    Closest { hierarchy: packets, rays: &rows, count, hits: &mut hits, ends: None, alone: |_: &Ray| None }
-        .with_simd(simd);
+    let (ends, alone) = (&mut [0.0; BATCH], |_: &Ray| None);
+    Closest::<_, false> { hierarchy: packets, rays: &rows, count, hits: &mut hits, ends, alone }.with_simd(simd);
     Occluded { hierarchy: packets, rays: &rows, count, occluded: &mut occluded, alone: |_: &Ray| false }
         .with_simd(simd);
     ((0..count).map(|lane| hits.get(lane)).collect(), occluded[..count].to_vec())

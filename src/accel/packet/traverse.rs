@@ -19,7 +19,7 @@ use crate::math::{Ray, RayRows};
 impl Hierarchy<'_> {
     /// Closest hits of the first `count` rays. Rays that do not fit into packets are traced by `alone`.
     pub fn intersect(&self, rays: &RayRows, count: usize, hits: &mut HitRows, alone: impl Fn(&Ray) -> Option<Hit>) {
-        run(Closest { hierarchy: self, rays, count, hits, ends: None, alone });
+        run(Closest::<_, false> { hierarchy: self, rays, count, hits, ends: &mut [0.0; BATCH], alone });
     }
 
     /// As [`intersect`](Self::intersect), with upper limits of the distances, or the ends of the rays that hit nothing.
@@ -31,7 +31,7 @@ impl Hierarchy<'_> {
         ends: &mut Row,
         alone: impl Fn(&Ray) -> Option<Hit>,
     ) {
-        run(Closest { hierarchy: self, rays, count, hits, ends: Some(ends), alone });
+        run(Closest::<_, true> { hierarchy: self, rays, count, hits, ends, alone });
     }
 
     /// Whether the first `count` rays hit anything.
@@ -243,34 +243,35 @@ fn run<K: WithSimd>(kernel: K) -> K::Output {
     }
 }
 
-pub(super) struct Closest<'a, F> {
+/// `WITHIN`: with upper limits of the distances, over analytic shapes.
+pub(super) struct Closest<'a, F, const WITHIN: bool> {
     pub hierarchy: &'a Hierarchy<'a>,
     pub rays: &'a RayRows,
     pub count: usize,
     pub hits: &'a mut HitRows,
-    /// Upper limits of the distances.
-    pub ends: Option<&'a mut Row>,
+    pub ends: &'a mut Row,
     pub alone: F,
 }
 
-impl<F: Fn(&Ray) -> Option<Hit>> WithSimd for Closest<'_, F> {
+impl<F: Fn(&Ray) -> Option<Hit>, const WITHIN: bool> WithSimd for Closest<'_, F, WITHIN> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { hierarchy, rays, count, hits, mut ends, alone } = self;
+        let Self { hierarchy, rays, count, hits, ends, alone } = self;
         for first in (0..count).step_by(S::F32_LANES) {
             let (mut packet, left_out) = Packet::new(simd, &hierarchy.sphere, rays, first, count - first);
-            if hierarchy.has_shapes {
+            let has_shapes = WITHIN || hierarchy.has_shapes;
+            if has_shapes {
                 hierarchy.traverse::<S, false, true>(simd, &mut packet);
             } else {
                 hierarchy.traverse::<S, false, false>(simd, &mut packet);
             }
             let lanes = first..first + S::F32_LANES;
-            let reported = if hierarchy.has_shapes { packet.reported } else { packet.t };
+            let reported = if has_shapes { packet.reported } else { packet.t };
             store_f32s(simd, reported, &mut hits.t[first..]);
             store_u32s(simd, packet.prim, &mut hits.shape[first..]);
-            if let Some(ends) = &mut ends {
+            if WITHIN {
                 store_f32s(simd, packet.t, &mut ends[first..]);
             }
             for lane in lanes {
@@ -283,7 +284,7 @@ impl<F: Fn(&Ray) -> Option<Hit>> WithSimd for Closest<'_, F> {
                 let ray = rays.get(first + lane);
                 let hit = alone(&ray);
                 hits.set(first + lane, hit);
-                if let Some(ends) = &mut ends {
+                if WITHIN {
                     ends[first + lane] = hit.map_or(ray.t_max, |hit| hit.t);
                 }
             }
