@@ -7,8 +7,8 @@ use crate::id::{PrimId, ShapeId};
 use crate::math::{Ray, Vec2};
 use crate::texture::{Footprint, SolidTable, Solidity, Texture};
 
-/// Places are kept once where so many triangles share each of them.
-const SHARED: usize = 4;
+/// Places are kept once where at least so many triangles, on average, share each.
+const MIN_TRIANGLES_PER_PLACE: usize = 4;
 
 /// How much of each shape is there.
 #[derive(Debug)]
@@ -90,18 +90,9 @@ impl ImageHoles {
             [corner, at(1.0, 0.0) - corner, at(0.0, 1.0) - corner]
         };
         let places: Vec<_> = (0..mesh.triangles().len()).map(of_triangle).collect();
-        let (mut number_of, mut distinct) = (HashMap::new(), Vec::new());
-        let mut number = |place: &[Vec2; 3]| {
-            *number_of.entry(place.map(|v| v.to_array().map(f32::to_bits))).or_insert_with(|| {
-                distinct.push(*place);
-                distinct.len() as u32 - 1
-            })
-        };
-        let numbers: Vec<_> = places.iter().map(&mut number).collect();
-        if SHARED * distinct.len() <= places.len() {
-            Self { table, places: distinct, numbers: Some(numbers) }
-        } else {
-            Self { table, places, numbers: None }
+        match distinct(&places) {
+            Some((places, numbers)) => Self { table, places, numbers: Some(numbers) },
+            None => Self { table, places, numbers: None },
         }
     }
 
@@ -111,6 +102,22 @@ impl ImageHoles {
         let [corner, along_u, along_v] = self.places[number];
         self.table.at(corner + along_u * hit.u + along_v * hit.v)
     }
+}
+
+/// The places that occur, and of each triangle the number of its own; `None` if too few triangles share them.
+fn distinct(places: &[[Vec2; 3]]) -> Option<(Vec<[Vec2; 3]>, Vec<u32>)> {
+    let (mut number_of, mut found, mut numbers) = (HashMap::new(), Vec::new(), Vec::new());
+    for place in places {
+        let number = *number_of.entry(place.map(|v| v.to_array().map(f32::to_bits))).or_insert(found.len() as u32);
+        if number as usize == found.len() {
+            if MIN_TRIANGLES_PER_PLACE * (found.len() + 1) > places.len() {
+                return None;
+            }
+            found.push(*place);
+        }
+        numbers.push(number);
+    }
+    Some((found, numbers))
 }
 
 #[cfg(test)]

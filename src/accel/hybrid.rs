@@ -10,7 +10,7 @@ use crate::id::{PrimId, ShapeId};
 use crate::math::rows::BATCH;
 use crate::math::{Aabb, Ray, RayRows};
 
-/// Up to this number of analytic shapes, packets beside Embree are faster (`docs/accelerators.md`).
+/// Up to this number of analytic shapes, packets beside Embree are mostly faster (`docs/accelerators.md`).
 const FEW: usize = 16;
 
 /// Embree, and a hierarchy for packets over the spheres, cylinders, disks and quads of the world that have no holes.
@@ -30,7 +30,7 @@ impl<'g> HybridAccel<'g> {
     /// As [`EmbreeAccel::new`].
     pub fn new(geometry: &'g Geometry, threads: usize) -> Result<Self> {
         let (mut shapes, mut others): (Vec<_>, Vec<_>) =
-            geometry.world.iter().partition(|&&id| is_for_packets(geometry, id));
+            geometry.world.iter().partition(|&&id| is_traced_in_packets(geometry, id));
         let packets = Hierarchy::new(geometry, &shapes, &geometry.bounds());
         if packets.is_none() {
             others.append(&mut shapes);
@@ -41,7 +41,7 @@ impl<'g> HybridAccel<'g> {
 
     /// Whether this is faster than Embree alone for `geometry`.
     pub fn suits(geometry: &Geometry) -> bool {
-        let count = geometry.world.iter().filter(|&&id| is_for_packets(geometry, id)).count();
+        let count = geometry.world.iter().filter(|&&id| is_traced_in_packets(geometry, id)).count();
         (1..=FEW).contains(&count)
     }
 
@@ -69,7 +69,7 @@ impl<'g> HybridAccel<'g> {
 }
 
 /// Whether a shape of the world is traced in packets.
-fn is_for_packets(geometry: &Geometry, id: ShapeId) -> bool {
+fn is_traced_in_packets(geometry: &Geometry, id: ShapeId) -> bool {
     matches!(geometry.shape(id), Shape::Analytic(placed) if has_intervals(&placed.shape))
         && !geometry.cutouts.has_holes(id)
 }

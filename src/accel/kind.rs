@@ -59,7 +59,7 @@ impl AccelKind {
         (
             "auto",
             "packets for at most 40 primitives beside spheres and cylinders, at rest, without holes; hybrid for at \
-             most 16 analytic shapes beside others; else embree",
+             most 16 spheres, cylinders, disks and quads beside others; else embree",
         ),
         ("embree", "Embree: fastest for large scenes; build quality medium, robust"),
         ("embree:low", "built faster, traced slower"),

@@ -80,6 +80,11 @@ impl Frustum {
         self.height
     }
 
+    /// Whether both radii are the same.
+    pub fn is_cylinder(&self) -> bool {
+        self.radii()[0] == self.radii()[1]
+    }
+
     /// Whether all angles are kept.
     pub fn is_full_turn(&self) -> bool {
         self.sector.is_full()

@@ -124,7 +124,7 @@ impl<'g> EmbreeAccel<'g> {
         let gate = RayLimits::for_instances(&geometry.instances)?;
         let device = Device::new(threads)?;
         let user_shapes = UserShapes::new(geometry);
-        let shapes = shape_handles(geometry, &device, &user_shapes)?;
+        let shapes = shape_handles(geometry, world_shapes, &device, &user_shapes)?;
         let objects = object_scenes(geometry, &device, &shapes, options)?;
         let entered = UserInstances::new(geometry, &objects);
         let mut world = SceneBuilder::new(&device, options)?;
@@ -188,14 +188,15 @@ impl<'g> EmbreeAccel<'g> {
     }
 }
 
-/// One Embree geometry for each shape in use, however many objects share it.
+/// One Embree geometry for each shape in use, in the world or in objects, however many share it.
 fn shape_handles(
     geometry: &Geometry,
+    world_shapes: &[ShapeId],
     device: &Device,
     user_shapes: &UserShapes,
 ) -> Result<Vec<Option<GeometryHandle>>> {
     let mut handles: Vec<Option<GeometryHandle>> = geometry.shapes.iter().map(|_| None).collect();
-    let used = geometry.world.iter().chain(geometry.objects.iter().flat_map(|object| &object.shapes));
+    let used = world_shapes.iter().chain(geometry.objects.iter().flat_map(|object| &object.shapes));
     for id in used {
         if handles[id.index()].is_none() {
             // SAFETY: the accelerator borrows the geometry and owns the user data, and drops its scene first.

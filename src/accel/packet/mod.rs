@@ -65,7 +65,7 @@ fn is_quadric(shape: &Shape) -> bool {
     match shape {
         Shape::Analytic(placed) => match &placed.shape {
             Analytic::Sphere(_) => true,
-            Analytic::Frustum(frustum) => frustum.radii()[0] == frustum.radii()[1],
+            Analytic::Frustum(frustum) => frustum.is_cylinder(),
             Analytic::Quad(_) | Analytic::Disk(_) | Analytic::Revolution(_) => false,
         },
         Shape::Mesh(_) | Shape::Curves(_) | Shape::Points(_) => false,

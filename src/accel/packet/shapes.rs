@@ -58,7 +58,7 @@ enum Bounded {
 pub(in crate::accel) fn has_intervals(shape: &Analytic) -> bool {
     match shape {
         Analytic::Sphere(_) | Analytic::Quad(_) | Analytic::Disk(_) => true,
-        Analytic::Frustum(frustum) => frustum.radii()[0] == frustum.radii()[1],
+        Analytic::Frustum(frustum) => frustum.is_cylinder(),
         Analytic::Revolution(_) => false,
     }
 }
@@ -137,7 +137,7 @@ impl<'g> PacketShape<'g> {
                 let size = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| world(axis * radius).length());
                 Bounded::Sphere(Quadric::new(c, scaled(DVec3::splat(1.0 / radius)), size, sphere.is_full()))
             }
-            Analytic::Frustum(frustum) if frustum.radii()[0] == frustum.radii()[1] => {
+            Analytic::Frustum(frustum) if frustum.is_cylinder() => {
                 let (radius, half) = (frustum.radii()[0], 0.5 * frustum.height());
                 let scale = DVec3::new(1.0 / radius, 1.0 / radius, 1.0 / half);
                 let size = [DVec3::X * radius, DVec3::Y * radius, DVec3::Z * half].map(|axis| world(axis).length());

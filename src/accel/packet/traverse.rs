@@ -249,6 +249,7 @@ pub(super) struct Closest<'a, F, const WITHIN: bool> {
     pub rays: &'a RayRows,
     pub count: usize,
     pub hits: &'a mut HitRows,
+    /// The limits; not written without `WITHIN`.
     pub ends: &'a mut Row,
     pub alone: F,
 }

@@ -128,7 +128,7 @@ pub struct BenchAccelArgs {
     pub scenes: Vec<PathBuf>,
     #[command(flatten)]
     pub import: ImportArgs,
-    /// Ray accelerator, with options such as embree:high. Default: all with their defaults
+    /// Ray accelerator, with options such as embree:high. Default: all, with their default options
     #[arg(long, value_name = "LIST", value_delimiter = ',', long_help = accel_help())]
     pub accel: Vec<AccelKind>,
     /// Rays of each kind, about
