@@ -38,7 +38,7 @@ fn full(mut prepared: Prepared) -> Image {
     result.image
 }
 
-fn full_of(scene: &Value) -> Image {
+pub fn full_of(scene: &Value) -> Image {
     full(prepare(scene, &Overrides { threads: Some(2), ..Overrides::default() }))
 }
 

@@ -21,6 +21,8 @@ mod bench_scale;
 mod bench_stability;
 /// Works that comments cite, and the bibliography of the book.
 mod bibliography;
+/// Paths connected to paths from the lights.
+mod bidirectional;
 /// The book: its pages, scenes and links.
 mod book;
 /// What the cameras of the scene file see.

@@ -32,6 +32,7 @@ const OPTIONS: [(Trust, &[&str]); 3] = [
             "clamp",
             "regularize",
             "caustics",
+            "bidirectional",
             "guiding",
             "sampler",
             "seed",

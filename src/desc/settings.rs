@@ -250,6 +250,10 @@ pub enum IntegratorDesc {
         /// How caustics are found: light that mirrors and clear glass throw on other surfaces. Default: paths.
         #[serde(default, skip_serializing_if = "CausticsDesc::is_default")]
         caustics: CausticsDesc,
+        /// Whether paths are also connected to paths from the lights: less noise where lamps shine at walls, ceilings
+        /// and lampshades rather than at what is seen, for about twice the time. Default: false.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        bidirectional: bool,
     },
     /// Whitted's ray tracing: mirror reflection, refraction, direct illumination by every light, and an ambient term.
     Whitted {
@@ -312,6 +316,7 @@ impl IntegratorDesc {
             hide_emitters: false,
             guiding: GuidingDesc::default(),
             caustics: CausticsDesc::default(),
+            bidirectional: false,
         }
     }
 

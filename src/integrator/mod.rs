@@ -4,6 +4,7 @@
 //! trace all rays, shade all hits, trace all shadow rays. Accelerators can then trace rays side by side that belong
 //! together, and each stage's code and data stay in the caches. `docs/wavefront.md` has the figures behind this choice.
 
+mod bidirectional;
 mod cancel;
 mod caustics;
 mod cones;
@@ -23,6 +24,7 @@ mod vertex;
 mod whitted;
 mod world;
 
+pub use bidirectional::{Emitters, LightPaths, LightVertex};
 pub use cancel::Cancel;
 pub use caustics::{CausticCasters, CausticPoint, Caustics, EPOCH, Photon, PhotonMap};
 pub use debug::{AmbientOcclusion, DebugView, View};
@@ -73,6 +75,12 @@ pub mod dimensions {
     /// vertex with this many bounces before it.
     pub const fn light(bounce: u32) -> u32 {
         1 + 2 * bounce
+    }
+
+    /// Of path tracing: choice of a light path's vertex (one, and one for its last digits), at the vertex with this
+    /// many bounces before it.
+    pub const fn connection(bounce: u32) -> u32 {
+        (1 << 29) + bounce
     }
 
     /// As [`light`] of the first vertex, for a further choice that does not depend on the other.
@@ -230,6 +238,8 @@ pub struct PassContext<'a> {
     pub guidance: Guidance<'a>,
     /// The photons that paths gather, if they do.
     pub caustics: Option<&'a Caustics<'a>>,
+    /// The light paths that paths are connected to, if they are.
+    pub light_paths: Option<&'a LightPaths<'a>>,
     /// What Russian roulette goes by, if it is [`Roulette::Auto`].
     pub continuations: Option<&'a ContinuationGrid>,
     /// Lights that are sampled at the first vertex of a path, at least 1.
@@ -276,6 +286,17 @@ pub trait Integrator: Send + Sync {
         _range: &PhotonRange,
         _workspace: &mut Workspace,
         _photons: &mut Vec<Photon>,
+    ) {
+    }
+
+    /// Traces light paths and appends their vertices. Integrators that are not bidirectional trace none.
+    fn trace_light_paths(
+        &self,
+        _pass: &PassContext,
+        _emitters: &Emitters,
+        _range: &PhotonRange,
+        _workspace: &mut Workspace,
+        _vertices: &mut Vec<LightVertex>,
     ) {
     }
 

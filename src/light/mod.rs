@@ -16,7 +16,7 @@ mod spot;
 mod test_support;
 mod tree;
 
-pub use area::{AreaLight, Emission};
+pub use area::{AreaLight, Emission, EmittedRay};
 pub(crate) use area::{placed_area, triangle_error};
 pub use directional::DirectionalLight;
 pub use environment::{Environment, EnvironmentMap, EnvironmentMapError, EnvironmentScratch};

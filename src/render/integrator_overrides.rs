@@ -54,6 +54,7 @@ pub(super) fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<Inte
     }
     set_guiding(&mut integrator, overrides)?;
     set_caustics(&mut integrator, overrides)?;
+    set_bidirectional(&mut integrator, overrides)?;
     Ok(integrator)
 }
 
@@ -104,20 +105,41 @@ fn set_caustics(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Resul
         };
         *caustics = chosen;
     }
-    let IntegratorDesc::Path { caustics: CausticsDesc::Photons, strategy, regularize, guiding, .. } = integrator else {
+    if !matches!(integrator, IntegratorDesc::Path { caustics: CausticsDesc::Photons, .. }) {
         return Ok(());
-    };
-    let other = [
+    }
+    match unsupported_with_light_paths(integrator, overrides) {
+        Some(option) => Err(refused("caustics", format!(" photons: unsupported with {option}; give `caustics` paths"))),
+        None => Ok(()),
+    }
+}
+
+fn set_bidirectional(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Result<()> {
+    if let Some(chosen) = overrides.bidirectional {
+        let IntegratorDesc::Path { bidirectional, .. } = integrator else {
+            return Err(refused("bidirectional", ": only the integrator path traces light paths"));
+        };
+        *bidirectional = chosen;
+    }
+    let IntegratorDesc::Path { bidirectional: true, caustics, .. } = integrator else { return Ok(()) };
+    let photons = (*caustics == CausticsDesc::Photons).then_some("`caustics` photons");
+    match photons.or_else(|| unsupported_with_light_paths(integrator, overrides)) {
+        Some(option) => {
+            Err(refused("bidirectional", format!(": unsupported with {option}; give `bidirectional` false")))
+        }
+        None => Ok(()),
+    }
+}
+
+/// The first option that is not supported with photons and light paths.
+fn unsupported_with_light_paths(integrator: &IntegratorDesc, overrides: &Overrides) -> Option<&'static str> {
+    let IntegratorDesc::Path { strategy, regularize, guiding, .. } = integrator else { return None };
+    let options = [
         (*strategy != StrategyDesc::Mis, "`strategy` other than mis"),
         (regularize.is_some(), "`regularize`"),
         (*guiding == GuidingDesc::On, "`guiding` on"),
         (overrides.guide.is_some(), "`guide`"),
         (overrides.target_error.is_some(), "`target_error`"),
     ];
-    match other.into_iter().find(|(is_given, _)| *is_given) {
-        Some((_, option)) => {
-            Err(refused("caustics", format!(" photons: unsupported with {option}; give `caustics` paths")))
-        }
-        None => Ok(()),
-    }
+    options.into_iter().find_map(|(is_given, option)| is_given.then_some(option))
 }

@@ -8,6 +8,7 @@ mod driver;
 mod exr_overrides;
 mod guiding_pilot;
 mod integrator_overrides;
+mod light_path_pass;
 mod overrides;
 mod pixel_order;
 mod planner;

@@ -50,6 +50,8 @@ pub struct Overrides {
     pub roulette: Option<RouletteDesc>,
     /// How caustics are found.
     pub caustics: Option<CausticsDesc>,
+    /// Whether paths are connected to paths from the lights.
+    pub bidirectional: Option<bool>,
     /// Whether paths are guided by what earlier ones have learned.
     pub guiding: Option<GuidingDesc>,
     /// Paths are guided by it, and do not train it.

@@ -129,6 +129,16 @@ impl Settings {
         matches!(self.integrator, IntegratorDesc::Path { caustics: CausticsDesc::Photons, .. })
     }
 
+    /// Whether samples share what is traced from the lights.
+    pub fn has_epochs(&self) -> bool {
+        self.gathers_photons() || self.is_bidirectional()
+    }
+
+    /// Whether paths are connected to light paths.
+    pub fn is_bidirectional(&self) -> bool {
+        matches!(self.integrator, IntegratorDesc::Path { bidirectional: true, .. })
+    }
+
     /// Whether paths train a guide in any case: a sample then depends on all that were before.
     pub fn is_guided(&self) -> bool {
         matches!(self.integrator, IntegratorDesc::Path { guiding: GuidingDesc::On, .. })
@@ -159,7 +169,7 @@ impl Settings {
         };
         self.guide.is_none()
             && self.target_error.is_none()
-            && !self.gathers_photons()
+            && !self.has_epochs()
             && strategy == StrategyDesc::Mis
             && max_depth >= LEAST_GUIDED_DEPTH
     }
@@ -402,6 +412,7 @@ mod tests {
             roulette: None,
             light_samples: None,
             caustics: CausticsDesc::Paths,
+            bidirectional: false,
         };
         assert_eq!(s.integrator, changed);
         assert_eq!(s.time_limit, Some(Duration::from_millis(1500)));

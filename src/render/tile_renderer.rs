@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::sync::Mutex;
 
 use super::caustic_pass::CausticPass;
+use super::light_path_pass::LightPathPass;
 use super::pixel_order::{pixel_of_slot, slots};
 use super::roulette_pass::RouletteEstimates;
 use super::{FINEST_SPP, Settings, TILE_SIZE, film_shape};
@@ -39,6 +40,7 @@ pub(super) struct TileRenderer<'a> {
     guide: Option<Guide>,
     /// What traces and keeps photons, if paths gather them.
     caustics: Option<CausticPass>,
+    light_paths: Option<LightPathPass>,
     /// What Russian roulette goes by, if it is to and the pilot was traced.
     roulette: Option<RouletteEstimates>,
     /// Lights that are sampled at the first vertex of a path; `None` for as many as the pilot finds best.
@@ -124,6 +126,7 @@ impl<'a> TileRenderer<'a> {
             filter,
             view: settings.size,
             caustics: settings.gathers_photons().then(|| CausticPass::new(scene, accel, settings)).flatten(),
+            light_paths: settings.is_bidirectional().then(|| LightPathPass::new(scene, settings)).flatten(),
             guide: settings.guide.as_ref().and_then(|guide| guide.of_scene(accel.bounds())),
             roulette: None,
             light_samples: match settings.integrator {
@@ -138,7 +141,15 @@ impl<'a> TileRenderer<'a> {
         let continuations = self.roulette.as_ref().map(|roulette| &roulette.continuations);
         let light_samples =
             self.light_samples.or(self.roulette.as_ref().map(|roulette| roulette.light_samples)).unwrap_or(1);
-        PassContext { world: &self.world, render: self.context, guidance, caustics: None, continuations, light_samples }
+        PassContext {
+            world: &self.world,
+            render: self.context,
+            guidance,
+            caustics: None,
+            light_paths: None,
+            continuations,
+            light_samples,
+        }
     }
 
     /// Traces the pilot of the picture, if roulette needs one.
@@ -178,8 +189,19 @@ impl<'a> TileRenderer<'a> {
 
     /// Traces the photons of a sample's epoch, unless they are there; the result is the rays traced.
     pub fn trace_photons(&mut self, sample: u32, workspaces: &[Mutex<TileWorkspace>]) -> RayCounts {
-        let Some(mut caustics) = self.caustics.take() else { return RayCounts::default() };
-        let counts = caustics.trace(
+        let mut counts = RayCounts::default();
+        if let Some(mut light_paths) = self.light_paths.take() {
+            counts.add(&light_paths.trace(
+                sample,
+                self.integrator.as_ref(),
+                &self.pass(Guidance::default()),
+                &self.sampler,
+                workspaces,
+            ));
+            self.light_paths = Some(light_paths);
+        }
+        let Some(mut caustics) = self.caustics.take() else { return counts };
+        let photons = caustics.trace(
             sample,
             self.integrator.as_ref(),
             &self.pass(Guidance::default()),
@@ -187,6 +209,7 @@ impl<'a> TileRenderer<'a> {
             workspaces,
         );
         self.caustics = Some(caustics);
+        counts.add(&photons);
         counts
     }
 
@@ -231,7 +254,9 @@ impl<'a> TileRenderer<'a> {
         }
         let caustics = self.caustics.as_ref().and_then(CausticPass::caustics);
         let guidance = Guidance { guide: guidance.guide.or(self.guide.as_ref()), ..guidance };
-        let pass = PassContext { caustics: caustics.as_ref(), ..self.pass(guidance) };
+        let light_paths = self.light_paths.as_ref().and_then(LightPathPass::light_paths);
+        let pass =
+            PassContext { caustics: caustics.as_ref(), light_paths: light_paths.as_ref(), ..self.pass(guidance) };
         self.integrator.render_batch(&pass, &workspace.samples, &mut workspace.integrator);
     }
 

@@ -314,6 +314,15 @@ impl Vertices {
         }
     }
 
+    /// The BSDF and its density for the directions of [`eval`](Self::eval) exchanged.
+    pub fn reversed_eval(&self, scene: &Scene, lane: usize, wi: Vec3) -> BsdfEval {
+        let wo = self.rows.wo.get(lane);
+        match self.bsdfs.get(scene, lane) {
+            None => Lambert { albedo: self.albedo(lane) }.eval(wi, wo),
+            Some(bsdf) => bsdf.eval(wi, wo),
+        }
+    }
+
     /// How light from the local direction `wi` leaves a vertex along its path.
     pub fn lobes(&self, scene: &Scene, lane: usize, wi: Vec3) -> LobeWeights {
         match self.bsdfs.get(scene, lane) {

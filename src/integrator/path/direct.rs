@@ -32,7 +32,7 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
         }
         if k + 1 < samples {
             let first = wave.shadows.count;
-            wave.queue_shadow_rays(context, block);
+            wave.queue_shadow_rays(context, block, 0);
             wave.continuations.mark_first_lights(first..wave.shadows.count);
         }
     }
@@ -47,7 +47,7 @@ fn scale(direct: &mut DirectRows, factor: f32) {
 
 /// Samples a light for each vertex of a block.
 fn sample_once(context: &Context, regions: Option<&Regions>, wave: &mut Wave, block: usize) {
-    let Wave { vertices, media, terminator_rays, light_queue, bsdf_rows, guided, .. } = wave;
+    let Wave { vertices, light_queue, bsdf_rows, guided, .. } = wave;
     let count = vertices.count;
     choose_lights(context, vertices, light_queue);
     let Vertices { rows, light_samples: lights, light_evals, bsdfs, non_diffuse, .. } = &mut *vertices;
@@ -57,7 +57,7 @@ fn sample_once(context: &Context, regions: Option<&Regions>, wave: &mut Wave, bl
     if let Some(regions) = regions {
         guided.mix_light_pdfs(regions, vertices);
     }
-    let Vertices { rows, points, light_samples: lights, light_evals: evals, direct, u_bsdf, .. } = &mut *vertices;
+    let Vertices { rows, points, light_samples: lights, light_evals: evals, direct, .. } = &mut *vertices;
     let mis = context.config.strategy == Strategy::Mis;
     let weighting = Weighting { mis, light_samples: context.light_samples() as f32 };
     if context.scene.features.normal_perturbations {
@@ -65,9 +65,11 @@ fn sample_once(context: &Context, regions: Option<&Regions>, wave: &mut Wave, bl
     } else {
         vectorize!(illuminate::<false>(rows, points, lights, evals, direct, weighting, count));
     }
+    super::connections::reweigh_light_samples(context, wave, block);
     if let Some(grid) = context.pass.continuations {
-        vectorize!(play_roulette(grid, rows, direct, u_bsdf, count));
+        roulette(grid, &mut wave.vertices);
     }
+    let Wave { vertices, media, terminator_rays, .. } = wave;
     wave.continuations.count_shadow_rays(vertices);
     if context.scene.features.shading_normals {
         wave.counts.shadow += offset_below_facets(context, vertices, terminator_rays);
@@ -77,6 +79,12 @@ fn sample_once(context: &Context, regions: Option<&Regions>, wave: &mut Wave, bl
     } else if context.scene.features.media {
         super::media::absorb_direct(context, vertices, media, block);
     }
+}
+
+/// Russian roulette of a block's shadow rays.
+pub(super) fn roulette(grid: &ContinuationGrid, vertices: &mut Vertices) {
+    let Vertices { rows, direct, u_bsdf, count, .. } = vertices;
+    vectorize!(play_roulette(grid, rows, direct, u_bsdf, *count));
 }
 
 /// Samples a light for each vertex that is not all mirror.

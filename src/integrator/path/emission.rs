@@ -2,6 +2,7 @@
 
 use super::Context;
 use super::caustics::CausticState;
+use super::connections::ConnectionState;
 use super::equiangular::{DirectionPdfs, SegmentVertex};
 use super::radiance::Output;
 use super::wave::{PathRows, Wave};
@@ -41,14 +42,15 @@ pub(super) fn bsdf_mis_weight(
 
 /// Adds the light of emitters at a block's vertices.
 pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Output) {
-    let Wave { vertices, paths, rays, light_aovs, caustics, media, .. } = &*wave;
+    let Wave { vertices, paths, rays, light_aovs, caustics, connections, media, .. } = &*wave;
     let (paths, rays) = (&paths[block], &rays[block]);
     for &lane in &vertices.emitters {
         let lane = usize::from(lane);
         let i = vertices.path(lane);
         let at = vertices.interaction(lane);
         let departure = media.get(block * BATCH + i).and_then(|state| state.departure.as_ref());
-        let met = Met { paths, i, ray: rays.get(i), caustic: caustics.get(block * BATCH + i), departure };
+        let (caustic, connection) = (caustics.get(block * BATCH + i), connections.get(block * BATCH + i));
+        let met = Met { paths, i, ray: rays.get(i), caustic, connection, departure };
         let Some((id, radiance)) = met.emitted(context, &at) else { continue };
         let light = context.config.clamped(paths.throughput.get(i) * radiance, context.bounce);
         if light.is_black() {
@@ -68,13 +70,14 @@ struct Met<'a> {
     i: usize,
     ray: Ray,
     caustic: Option<&'a CausticState>,
+    connection: Option<&'a ConnectionState>,
     departure: Option<&'a SegmentVertex>,
 }
 
 impl Met<'_> {
     /// The light of the surface with what it emits against the ray, weighted by MIS; `None` if it is no emitter.
     fn emitted(&self, context: &Context, at: &SurfaceInteraction) -> Option<(LightId, Rgb)> {
-        let Self { paths, i, ray, caustic, departure } = self;
+        let Self { paths, i, ray, caustic, connection, departure } = self;
         let scene = context.scene;
         let id = scene.surface(at.shape).light(at.prim)?;
         let Light::Area(light) = scene.lights.get(id) else { return None };
@@ -86,6 +89,10 @@ impl Met<'_> {
             light.pdf(&scene.geometry, from.p, ray, at) * scene.lights.pmf(id, from, context.compensation)
         };
         let mut weight = bsdf_mis_weight(context, paths, *i, *caustic, light_pdf);
+        if let Some(connection) = connection {
+            let connections = connection.of_emission(context, id, at.n_g);
+            weight = (f64::from(weight) / (1.0 + f64::from(weight) * connections)) as f32;
+        }
         if let Some(arrival) = departure {
             let light = light.pdf(&scene.geometry, paths.from(*i).p, ray, at);
             weight *= arrival.share(context, id, DirectionPdfs { light, phase: paths.pdf[*i] });

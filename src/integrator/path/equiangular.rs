@@ -116,7 +116,7 @@ pub(super) fn add(context: &Context, wave: &Wave, path: &SegmentPath, segment: &
     let light = context.config.clamped(contribution * left, context.bounce + 1);
     out.add(path.slot, light);
     if context.config.needs_light_aovs() {
-        let event = wave.light_aovs.shadow_event(context, path.index, || LobeWeights::Volume);
+        let event = wave.light_aovs.shadow_event(context, path.index, 0, || LobeWeights::Volume);
         out.add_to_light_aovs(context, path.slot, light, event, choice.id);
     }
     traced

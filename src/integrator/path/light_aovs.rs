@@ -43,11 +43,22 @@ impl LightAovs {
         }
     }
 
-    /// The class of light that a shadow ray from a path's vertex finds, which scatters it with these weights of lobes.
-    pub fn shadow_event(&self, context: &Context, path: usize, lobes: impl FnOnce() -> LobeWeights) -> LightEvent {
+    /// The class of light that a shadow ray from a path's vertex finds, scattered `scatterings` times before, which the
+    /// vertex scatters with these weights of lobes.
+    pub fn shadow_event(
+        &self,
+        context: &Context,
+        path: usize,
+        scatterings: u32,
+        lobes: impl FnOnce() -> LobeWeights,
+    ) -> LightEvent {
         // Without AOVs by scattering, any class will do.
         let is_first = context.bounce == 0 && context.config.light_aovs.by_scattering;
-        if is_first { LightEvent::Direct(lobes()) } else { self.event(context.bounce + 1, path, LightEvent::Emission) }
+        match (is_first, scatterings) {
+            (true, 0) => LightEvent::Direct(lobes()),
+            (true, _) => LightEvent::Indirect(lobes()),
+            (false, _) => self.event(context.bounce + 1 + scatterings, path, LightEvent::Emission),
+        }
     }
 
     /// Moves the state of a path to its compacted index, after a vertex that scattered it so.

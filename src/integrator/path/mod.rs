@@ -8,6 +8,7 @@
 
 mod block;
 mod caustics;
+mod connections;
 mod continuations;
 mod direct;
 mod emission;
@@ -15,6 +16,7 @@ mod equiangular;
 mod evals;
 mod guided;
 mod light_aovs;
+mod light_paths;
 mod materials;
 mod media;
 mod miss;
@@ -31,8 +33,8 @@ mod wave;
 use super::cancel;
 use super::regularization::Regularization;
 use super::{
-    CameraBatch, CausticCasters, Guidance, Integrator, PassContext, Photon, PhotonRange, PilotRecords, Roulette,
-    SecondMoments, Strategy, SurfaceAovs, Workspace, World, dimensions,
+    CameraBatch, CausticCasters, Emitters, Guidance, Integrator, LightVertex, PassContext, Photon, PhotonRange,
+    PilotRecords, Roulette, SecondMoments, Strategy, SurfaceAovs, Workspace, World, dimensions,
 };
 use crate::color::Rgb;
 use crate::film::{LightAovRequest, SampleBatch};
@@ -142,6 +144,17 @@ impl Integrator for PathIntegrator {
         photons::trace(self, pass, &photons::Source { casters, range }, workspace, photons);
     }
 
+    fn trace_light_paths(
+        &self,
+        pass: &PassContext,
+        emitters: &Emitters,
+        range: &PhotonRange,
+        workspace: &mut Workspace,
+        vertices: &mut Vec<LightVertex>,
+    ) {
+        light_paths::trace(self, pass, &light_paths::Source { emitters, range }, workspace, vertices);
+    }
+
     fn trace_pilot(
         &self,
         pass: &PassContext,
@@ -158,6 +171,7 @@ impl Integrator for PathIntegrator {
         let pass = PassContext {
             guidance: Guidance::default(),
             caustics: None,
+            light_paths: None,
             continuations: None,
             light_samples: PILOT_LIGHT_SAMPLES,
             ..*pass
@@ -225,6 +239,7 @@ impl PathIntegrator {
                 vertices::build_frames(context, wave);
                 wave.draw(context);
                 let regions = guide.map(|guide| Regions::find(guide, &wave.vertices));
+                connections::sample(context, wave, block);
                 direct::sample(context, regions.as_ref(), wave, block);
                 caustics::gather(context, wave, block, out);
                 scatter::sample(context, regions.as_ref(), wave, block);

@@ -52,7 +52,8 @@ pub(super) fn trace(
         light_aovs: LightAovRequest::default(),
         ..config.clone()
     };
-    let pass = &PassContext { guidance: Guidance::default(), caustics: None, continuations: None, ..*pass };
+    let pass =
+        &PassContext { guidance: Guidance::default(), caustics: None, light_paths: None, continuations: None, ..*pass };
     let (world, compensation) = (pass.world, config.strategy.compensation());
     let mut context = Context { config, pass, world, scene: world.scene, bounce: 0, is_last: false, compensation };
     let Workspace { counts, paths: PathBuffers(wave), .. } = workspace;

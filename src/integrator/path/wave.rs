@@ -2,9 +2,11 @@
 
 use super::block::{Vertices, spawn};
 use super::caustics::CausticState;
+use super::connections::ConnectionState;
 use super::continuations::ContinuationRecorder;
 use super::guided::GuideRecorder;
 use super::light_aovs::{LightAovs, PathMove};
+use super::light_paths::LightPathState;
 use super::miss::MissScratch;
 use super::photons::PhotonState;
 use super::terminator::TerminatorRays;
@@ -140,6 +142,10 @@ pub(super) struct Wave {
     pub caustics: Vec<CausticState>,
     /// By photon, where the wave is one of photons.
     pub photons: Vec<PhotonState>,
+    /// By path, where paths are connected to light paths.
+    pub connections: Vec<ConnectionState>,
+    /// By light path, where the wave is one of light paths.
+    pub light_paths: Vec<LightPathState>,
     pub light_aovs: LightAovs,
     pub guided: GuideRecorder,
     pub continuations: ContinuationRecorder,
@@ -183,6 +189,11 @@ impl Wave {
             self.caustics.resize(samples.len(), CausticState::default());
         }
         self.photons.clear();
+        self.light_paths.clear();
+        self.connections.clear();
+        if context.pass.light_paths.is_some() {
+            self.connections.resize(samples.len(), ConnectionState::default());
+        }
         self.light_aovs.start(context.config, samples.len());
         self.guided.clear();
         self.shadows.count = 0;
@@ -226,7 +237,7 @@ impl Wave {
     /// Queues the shadow rays of a block's vertices and moves the paths that go on to the index `survivors` and those
     /// after it; the result is the number of all paths that go on so far.
     pub fn append(&mut self, context: &Context, block: usize, survivors: usize) -> usize {
-        self.queue_shadow_rays(context, block);
+        self.queue_shadow_rays(context, block, 0);
         let Vertices { count, scatter, .. } = &self.vertices;
         let lanes = Compaction::equal(&scatter.status, spawn::SPAWNED, *count);
         if lanes.is_empty() {
@@ -267,8 +278,8 @@ impl Wave {
         }
     }
 
-    /// Queues the shadow rays of a block's vertices.
-    pub fn queue_shadow_rays(&mut self, context: &Context, block: usize) {
+    /// Queues the shadow rays of a block's vertices, towards light that was scattered `scatterings` times before.
+    pub fn queue_shadow_rays(&mut self, context: &Context, block: usize, scatterings: u32) {
         if context.config.clamp.is_finite() {
             self.vertices.clamp_direct(context);
         }
@@ -277,7 +288,8 @@ impl Wave {
         if context.config.needs_light_aovs() {
             for lane in (0..BATCH).filter(|&lane| lanes.contains(lane)) {
                 let lobes = || self.vertices.lobes(context.scene, lane, self.vertices.light_evals.wi.get(lane));
-                let event = self.light_aovs.shadow_event(context, block * BATCH + self.vertices.path(lane), lobes);
+                let path = block * BATCH + self.vertices.path(lane);
+                let event = self.light_aovs.shadow_event(context, path, scatterings, lobes);
                 self.light_aovs.shadow_sources.push((event, LightId(self.vertices.light_samples.light[lane])));
             }
         }
@@ -302,12 +314,16 @@ impl Wave {
             && self.walks.is_empty()
             && self.cones.is_empty()
             && self.caustics.is_empty()
-            && self.photons.is_empty())
+            && self.photons.is_empty()
+            && self.connections.is_empty()
+            && self.light_paths.is_empty())
     }
 
     /// Moves the state that only some renders have.
     fn append_optional(&mut self, context: &Context, block: usize, survivors: usize) {
-        let Self { vertices, media, walks, cones, caustics, photons, light_aovs, .. } = self;
+        let Self {
+            vertices, paths, media, walks, cones, caustics, photons, connections, light_paths, light_aovs, ..
+        } = self;
         let scatter = &vertices.scatter;
         let lanes = (0..vertices.count).filter(|&lane| scatter.status[lane] == spawn::SPAWNED);
         for (to, lane) in (survivors..).zip(lanes) {
@@ -327,6 +343,12 @@ impl Wave {
             }
             if let Some(&state) = photons.get(path) {
                 photons[to] = super::photons::after(vertices, lane, state);
+            }
+            if let Some(&state) = connections.get(path) {
+                connections[to] = super::connections::after(context, vertices, lane, &paths[block], state);
+            }
+            if let Some(&state) = light_paths.get(path) {
+                light_paths[to] = state;
             }
             if context.needs_aov_state() {
                 let lobes = || vertices.sampled_lobes(context.scene, lane);

@@ -1,5 +1,6 @@
 //! Light from surfaces.
 
+mod emission;
 mod emitters;
 mod parallelogram;
 mod queue;
@@ -9,6 +10,7 @@ mod triangle;
 
 use std::f64::consts::PI;
 
+pub use emission::EmittedRay;
 pub(super) use emitters::EmitterQueue;
 use parallelogram::ParallelogramEmitter;
 pub(super) use queue::AreaQueue;

@@ -145,7 +145,7 @@ impl RenderState {
             Planner::Guided(planner) => planner.samples_with_this_guide(self.done),
             Planner::Pilot(_) => PilotPlanner::samples_with_this_guide(self.done),
             // Of one epoch of photons.
-            Planner::Uniform if session.settings.gathers_photons() => EPOCH - missing.start % EPOCH,
+            Planner::Uniform if session.settings.has_epochs() => EPOCH - missing.start % EPOCH,
             Planner::Uniform => u32::MAX,
         };
         let tiles = self.tiles_in_partial_pass..(self.tiles_in_partial_pass + size.tiles).min(all);

@@ -286,6 +286,11 @@ pub struct RenderArgs {
     /// Not with --guiding, --guide, --target-error or --regularize. Default: paths
     #[arg(long, value_name = "NAME", value_parser = names::plain::<CausticsDesc>(), help_heading = "Algorithm")]
     pub caustics: Option<CausticsDesc>,
+    /// Bidirectional path tracing: connect paths to paths from the lights
+    ///
+    /// Less noise of lamps that shine at walls and shades. Not with --caustics photons or what that excludes
+    #[arg(long, help_heading = "Algorithm")]
+    pub bidirectional: bool,
     /// Path guiding: sample directions by the incident radiance learned from earlier paths
     ///
     /// For scenes whose light comes by few ways, such as through a door ajar. auto: if a pilot, and samples with and
@@ -468,6 +473,7 @@ impl RenderArgs {
             clamp: self.clamp,
             regularize: self.regularize,
             caustics: self.caustics,
+            bidirectional: self.bidirectional.then_some(true),
             guiding: if self.no_guiding { Some(GuidingDesc::Off) } else { self.guiding },
             guide: None,
             time_limit: self.time_limit,

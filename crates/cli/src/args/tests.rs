@@ -21,8 +21,8 @@ fn the_definition_is_sound() {
 fn every_option_reaches_the_overrides() {
     let line = "-o a.exr -o b.png --spp 5 --size 20x10 --crop 1,2,3,4 --threads 2 --seed 9 --integrator path \
                 --accel linear --sampler independent --max-depth 3 --strategy light --clamp 2.5 --regularize 0.2 \
-                --caustics photons --guiding --time-limit 1.5 --layers Z,albedo --float --exposure -1.5 \
-                --view filmic --exr profile=nuke,owner=a --exr owner=b \
+                --caustics photons --bidirectional --guiding --time-limit 1.5 --layers Z,albedo --float \
+                --exposure -1.5 --view filmic --exr profile=nuke,owner=a --exr owner=b \
                 --no-depth-of-field --transparent -vv";
     let arguments = render(&line.split_whitespace().collect::<Vec<_>>()).unwrap();
     let o = arguments.overrides(vec!["d.exr".to_owned()]);
@@ -47,6 +47,7 @@ fn every_option_reaches_the_overrides() {
         (vec!["a.exr".to_owned(), "b.png".to_owned()], vec!["d.exr".to_owned()])
     );
     assert_eq!((o.exr.profile, o.exr.owner), (Some(ExrProfileDesc::Nuke), Some("b".to_owned())));
+    assert_eq!(o.bidirectional, Some(true));
     assert_eq!((o.caustics, o.guiding), (Some(CausticsDesc::Photons), Some(GuidingDesc::On)));
     assert!(o.regularize == Some(0.2) && o.no_depth_of_field && o.transparent == Some(true));
     assert_eq!((arguments.verbosity.verbose, arguments.verbosity.quiet), (2, false));

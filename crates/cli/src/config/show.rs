@@ -13,7 +13,7 @@ use crate::log::{self, Level};
 use crate::text;
 
 /// Options whose values a scene has, with their places in it.
-const IN_SCENES: [(&str, &[&str]); 13] = [
+const IN_SCENES: [(&str, &[&str]); 14] = [
     ("output", &["/outputs"]),
     ("spp", &["/sampler/spp"]),
     ("size", &["/film/width", "/film/height"]),
@@ -25,6 +25,7 @@ const IN_SCENES: [(&str, &[&str]); 13] = [
     ("clamp", &["/integrator/clamp"]),
     ("regularize", &["/integrator/regularize"]),
     ("caustics", &["/integrator/caustics"]),
+    ("bidirectional", &["/integrator/bidirectional"]),
     ("sampler", &["/sampler/type"]),
     ("seed", &["/sampler/seed"]),
 ];

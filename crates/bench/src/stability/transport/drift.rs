@@ -94,6 +94,7 @@ fn run(settings: &Settings, world: &World, to: u32) -> Option<Vec<Checkpoint>> {
             render: RenderContext::new(world.scene, [WIDTH; 2], to),
             guidance: Guidance::default(),
             caustics: None,
+            light_paths: None,
             continuations: None,
             light_samples: 1,
         },

@@ -1,0 +1,79 @@
+//! Bidirectional path tracing: paths from the lights, whose vertices paths from the camera connect to.
+//!
+//! The vertices of many light paths are stored; every vertex of a camera path is connected to one of them, chosen at
+//! random ("light vertex cache": Davidovič, Křivánek, Hašan and Slusallek 2014). Multiple importance sampling weighs
+//! connections against light sampling and against meeting lights by chance (Veach 1997, chapter 10), with the sums over
+//! strategies kept along both paths (Georgiev, "Implementing Vertex Connection and Merging", 2012). There are no
+//! connections to the camera itself.
+//!
+//! The sample index of a camera path decides on the light paths that it is connected to: each epoch of [`EPOCH`]
+//! samples has its own, which depend on the seed and on the epoch alone.
+//!
+//! [`EPOCH`]: super::EPOCH
+
+mod emitters;
+
+pub use emitters::Emitters;
+
+use crate::bsdf::Bsdf;
+use crate::color::Rgb;
+use crate::geometry::SpawnPoint;
+use crate::id::LightId;
+use crate::math::{Frame, Vec3};
+
+/// Connections of a vertex of a camera path over the light paths' vertices per path, as MIS weights take them: any
+/// constant is unbiased.
+pub const CONNECTIONS_PER_VERTEX: f64 = 0.4;
+
+/// Where a light path meets a surface.
+#[derive(Clone, Debug)]
+pub struct LightVertex {
+    /// The point, with its geometric normal.
+    pub point: SpawnPoint,
+    /// The shading frame.
+    pub frame: Frame,
+    /// Unit direction to where the light comes from, in the frame.
+    pub wi: Vec3,
+    /// Cosine of this direction with the geometric normal.
+    pub cos_geometric: f32,
+    /// Cosine of the shading and the geometric normal where a normal or bump map makes them differ, else zero.
+    pub cos_normals: f32,
+    /// Flux that arrives, times the number of light paths.
+    pub flux: Rgb,
+    /// How light is scattered.
+    pub bsdf: Bsdf,
+    /// The light that it comes from.
+    pub light: LightId,
+    /// Segments from the light.
+    pub segments: u32,
+    /// What other strategies weigh.
+    pub mis: PartialMis,
+}
+
+/// Sums of the squared densities of other strategies over that of a path's own, as of its last vertex (dVCM and dVC of
+/// Georgiev 2012).
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PartialMis {
+    /// Of the strategy that ends this path one vertex before, without the factor of the vertex to come.
+    pub d_vcm: f64,
+    /// Of those that end it earlier, likewise.
+    pub d_vc: f64,
+}
+
+/// The light paths of an epoch.
+#[derive(Debug)]
+pub struct LightPaths<'a> {
+    /// Where they start.
+    pub emitters: &'a Emitters,
+    /// Their vertices.
+    pub vertices: &'a [LightVertex],
+    /// The number of paths.
+    pub traced: u32,
+}
+
+/// The square, in which densities are compared (power heuristic).
+#[inline]
+pub fn squared(ratio: f32) -> f64 {
+    let ratio = f64::from(ratio);
+    ratio * ratio
+}

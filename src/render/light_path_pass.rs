@@ -1,0 +1,85 @@
+//! Light paths: one set for each epoch of samples.
+
+use std::ops::RangeInclusive;
+use std::sync::{Mutex, PoisonError};
+
+use rayon::prelude::*;
+
+use super::tile_renderer::TileWorkspace;
+use super::{Settings, TILE_SIZE};
+use crate::integrator::{EPOCH, Emitters, Integrator, LightPaths, LightVertex, PassContext, PhotonRange, RayCounts};
+use crate::sampling::{PixelSeed, Sampler};
+use crate::scene::Scene;
+
+/// Light paths traced in an epoch, by pixel of the picture.
+const PATHS_PER_PIXEL: f64 = 0.5;
+
+/// The fewest and the most light paths traced in an epoch.
+const PATHS: RangeInclusive<f64> = 16_384.0..=1e6;
+
+/// Traces light paths and keeps those of one epoch.
+pub(super) struct LightPathPass {
+    emitters: Emitters,
+    traced: u32,
+    /// The epoch, and the vertices of its paths.
+    vertices: Option<(u32, Vec<LightVertex>)>,
+}
+
+impl LightPathPass {
+    /// For a scene; `None` if no light path can start in it.
+    pub fn new(scene: &Scene, settings: &Settings) -> Option<Self> {
+        let features = &scene.features;
+        let unsupported = [
+            (features.media, "media"),
+            (features.subsurface, "random walks below surfaces"),
+            (features.motion, "motion while the shutter is open"),
+        ];
+        if let Some((_, what)) = unsupported.into_iter().find(|(is_there, _)| *is_there) {
+            tracing::warn!("bidirectional path tracing does not support {what}: paths are not connected");
+            return None;
+        }
+        let emitters = Emitters::new(scene)?;
+        let [width, height] = settings.size.map(f64::from);
+        let traced = (PATHS_PER_PIXEL * width * height).clamp(*PATHS.start(), *PATHS.end()) as u32;
+        Some(Self { emitters, traced, vertices: None })
+    }
+
+    /// What paths are connected to, if there is anything.
+    pub fn light_paths(&self) -> Option<LightPaths<'_>> {
+        let (_, vertices) = self.vertices.as_ref().filter(|(_, vertices)| !vertices.is_empty())?;
+        Some(LightPaths { emitters: &self.emitters, vertices, traced: self.traced })
+    }
+
+    /// Traces the light paths of a sample's epoch, unless they are there; the result is the rays traced.
+    pub fn trace(
+        &mut self,
+        sample: u32,
+        integrator: &dyn Integrator,
+        pass: &PassContext,
+        sampler: &Sampler,
+        workspaces: &[Mutex<TileWorkspace>],
+    ) -> RayCounts {
+        let epoch = sample / EPOCH;
+        if self.vertices.as_ref().is_some_and(|(known, _)| *known == epoch) {
+            return RayCounts::default();
+        }
+        // Beyond all pixels, and beside the photons' seeds.
+        let seed: PixelSeed = sampler.pixel(epoch, u32::MAX - 1);
+        let chunk = TILE_SIZE * TILE_SIZE;
+        let parts: Vec<(Vec<LightVertex>, RayCounts)> = (0..self.traced.div_ceil(chunk))
+            .into_par_iter()
+            .map(|i| {
+                let range = PhotonRange { seed, indices: i * chunk..((i + 1) * chunk).min(self.traced) };
+                let thread = rayon::current_thread_index().unwrap_or(0) % workspaces.len();
+                let mut workspace = workspaces[thread].lock().unwrap_or_else(PoisonError::into_inner);
+                let mut vertices = Vec::new();
+                integrator.trace_light_paths(pass, &self.emitters, &range, &mut workspace.integrator, &mut vertices);
+                (vertices, std::mem::take(&mut workspace.integrator.counts))
+            })
+            .collect();
+        let mut counts = RayCounts::default();
+        parts.iter().for_each(|(_, part)| counts.add(part));
+        self.vertices = Some((epoch, parts.into_iter().flat_map(|(vertices, _)| vertices).collect()));
+        counts
+    }
+}
