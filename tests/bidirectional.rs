@@ -127,6 +127,34 @@ fn short_paths_are_those_of_paths() {
     assert_eq!(direct(true), direct(false));
 }
 
+/// Densities per area grow and shrink with the fourth power of the scale, weights do not.
+#[test]
+fn weights_do_not_depend_on_the_unit_of_length() {
+    let mean = |unit: f64| {
+        let mut scene = plain();
+        let scale = |value: &mut Value| {
+            for x in value.as_array_mut().unwrap() {
+                *x = json!(x.as_f64().unwrap() * unit);
+            }
+        };
+        ["position", "look_at"].into_iter().for_each(|key| scale(&mut scene["camera"][key]));
+        for shape in scene["shapes"].as_array_mut().unwrap() {
+            ["origin", "edge_u", "edge_v"].into_iter().for_each(|key| scale(&mut shape[key]));
+        }
+        let prepared = prepare(&scene, &Overrides { bidirectional: Some(true), spp: Some(8), ..Overrides::default() });
+        let result = render_with(&prepared, AccelKind::EMBREE);
+        assert_eq!(result.stats.nan_samples, 0, "{unit}");
+        let blocks = block_means(&result.image);
+        blocks.iter().sum::<f64>() / blocks.len() as f64
+    };
+    let expected = mean(1.0);
+    // Powers of two: the same paths, up to the distances that rays keep from surfaces.
+    for unit in [2f64.powi(-20), 2f64.powi(20)] {
+        let found = mean(unit);
+        assert!((found / expected - 1.0).abs() < 1e-3, "{unit}: {found} for {expected}");
+    }
+}
+
 #[test]
 fn bidirectional_pictures_do_not_depend_on_threads() {
     let image =

@@ -71,6 +71,13 @@ pub struct LightPaths<'a> {
     pub traced: u32,
 }
 
+/// A sum of squared densities of other strategies, for a weight of `1 / (1 + sum)`: finite, and 0 where it is not a
+/// number, as where one density overflows and another is 0.
+#[inline]
+pub fn bounded(sum: f64) -> f64 {
+    sum.max(0.0).min(f64::MAX)
+}
+
 /// The square, in which densities are compared (power heuristic).
 #[inline]
 pub fn squared(ratio: f32) -> f64 {

@@ -8,7 +8,7 @@ use super::wave::{PathRows, Wave};
 use crate::color::Rgb;
 use crate::geometry::SpawnPoint;
 use crate::id::LightId;
-use crate::integrator::bidirectional::{CONNECTIONS_PER_VERTEX, LightPaths, LightVertex, PartialMis, squared};
+use crate::integrator::bidirectional::{CONNECTIONS_PER_VERTEX, LightPaths, LightVertex, PartialMis, bounded, squared};
 use crate::integrator::dimensions;
 use crate::integrator::vertex::HemisphereTest;
 use crate::light::light_target;
@@ -40,10 +40,8 @@ impl ConnectionState {
         if self.d_vc == 0.0 {
             return 0.0;
         }
-        squared(emitters.pdf_per_cos(context.scene, id, n))
-            * CONNECTIONS_PER_VERTEX
-            * CONNECTIONS_PER_VERTEX
-            * self.d_vc
+        let pdf = squared(emitters.pdf_per_cos(context.scene, id, n));
+        bounded(pdf * CONNECTIONS_PER_VERTEX * CONNECTIONS_PER_VERTEX * self.d_vc)
     }
 }
 
@@ -180,7 +178,7 @@ impl Connection<'_> {
         let by_camera = squared(light_evals.pdf[lane] * cos_light / distance_squared)
             * (vertex.mis.d_vcm + vertex.mis.d_vc * squared(toward_light.pdf));
         let by_light = squared(toward_vertex * cos / distance_squared) * (mis.d_vcm + mis.d_vc * squared(back));
-        Some(light * (1.0 / (1.0 + by_camera + by_light)) as f32)
+        Some(light * (1.0 / (1.0 + bounded(by_camera + by_light))) as f32)
     }
 }
 
@@ -207,7 +205,7 @@ pub(super) fn reweigh_light_samples(context: &Context, wave: &mut Wave, block: u
         let connections = squared(start * cos) * CONNECTIONS_PER_VERTEX * CONNECTIONS_PER_VERTEX / (pdf * pdf)
             * (mis.d_vcm + mis.d_vc * squared(back));
         let others = 1.0 + squared(evals.pdf[lane]) / (pdf * pdf);
-        let factor = (others / (others + connections)) as f32;
+        let factor = (1.0 / (1.0 + bounded(connections / others))) as f32;
         let contribution = direct.contribution.get(lane) * factor;
         vertices.direct.contribution.set(lane, contribution);
     }
