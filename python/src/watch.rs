@@ -88,7 +88,7 @@ impl Progress for Listener {
 /// result is the picture of the samples so far. picture: a function that is called with the picture so far and its
 /// samples per pixel, at most every `picture_every` seconds. Both are called in the thread that called `render`.
 /// Settings, with the names of the options of `steradian render`: spp, size, crop, seed, threads, integrator,
-/// max_depth, layers, time_limit, target_error, accel, guiding, caustics, roulette, clamp, denoise,
+/// max_depth, layers, time_limit, target_error, accel, guiding, caustics, bidirectional, roulette, clamp, denoise,
 /// set={"integrator.clamp": 10}, ...
 #[pyfunction]
 #[pyo3(signature = (scene, *, progress=None, picture=None, picture_every=1.0, **settings))]

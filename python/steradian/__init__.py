@@ -75,7 +75,7 @@ def render(
     Settings replace those of the scene for this render. They have the names of the options of `steradian render`:
     spp, size=(width, height), crop=(x, y, width, height), seed, threads, integrator="path", max_depth,
     layers=["N", "albedo"] or "all", time_limit (seconds), target_error, accel="embree", guiding, caustics="photons",
-    roulette="auto", clamp, denoise=True, oidn_library, set={"film.filter.type": "box"} and so on.
+    bidirectional=True, roulette="auto", clamp, denoise=True, oidn_library, set={"film.filter.type": "box"} and so on.
     """
     if progress is True:
         with _progress.Bar() as bar:

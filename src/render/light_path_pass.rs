@@ -14,8 +14,8 @@ use crate::scene::Scene;
 /// Light paths traced in an epoch, by pixel of the picture.
 const PATHS_PER_PIXEL: f64 = 0.5;
 
-/// The fewest and the most light paths traced in an epoch.
-const PATHS: RangeInclusive<f64> = 16_384.0..=1e6;
+/// The fewest and the most light paths traced in an epoch; the most take 200 MB.
+const PATHS: RangeInclusive<f64> = 16_384.0..=250_000.0;
 
 /// Traces light paths and keeps those of one epoch.
 pub(super) struct LightPathPass {

@@ -130,12 +130,12 @@ impl Settings {
     }
 
     /// Whether samples share what is traced from the lights.
-    pub fn has_epochs(&self) -> bool {
+    pub(crate) fn has_epochs(&self) -> bool {
         self.gathers_photons() || self.is_bidirectional()
     }
 
     /// Whether paths are connected to light paths.
-    pub fn is_bidirectional(&self) -> bool {
+    pub(crate) fn is_bidirectional(&self) -> bool {
         matches!(self.integrator, IntegratorDesc::Path { bidirectional: true, .. })
     }
 

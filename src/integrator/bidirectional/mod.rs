@@ -75,7 +75,7 @@ pub struct LightPaths<'a> {
 /// number, as where one density overflows and another is 0.
 #[inline]
 pub fn bounded(sum: f64) -> f64 {
-    sum.max(0.0).min(f64::MAX)
+    if sum > 0.0 { sum.min(f64::MAX) } else { 0.0 }
 }
 
 /// The square, in which densities are compared (power heuristic).
