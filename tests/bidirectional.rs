@@ -44,6 +44,15 @@ fn plain() -> Value {
     scene_of(&wall_lamp(), &json!([]), &json!({}))
 }
 
+/// A lamp hidden from the camera before the other: light from there does not pass it.
+fn hidden_lamp() -> Value {
+    let lamp = json!({
+        "type": "quad", "material": "white", "origin": [-0.3, 2.1, -1.5], "edge_u": [0, 0.5, 0], "edge_v": [1, 0, 0],
+        "emission": { "radiance": [1, 2, 3], "hidden": true }
+    });
+    scene_of(&wall_lamp(), &json!([lamp]), &json!({}))
+}
+
 /// Smooth normals on coarse facets, which light paths and paths from the camera see differently, lit by a sphere.
 fn smooth_facets() -> Value {
     let corner = |x: f64, z: f64| json!([x, 0.65 - 0.5 * (x * x + z * z), z]);
@@ -100,7 +109,9 @@ fn of_seed(scene: &Value, bidirectional: bool, seed: u64, spp: u32) -> Image {
 /// By Welch's test on blocks of pixels: a wrong density or weight of any strategy would be seen.
 #[test]
 fn light_paths_and_paths_have_the_same_mean() {
-    for (what, scene) in [("plain", plain()), ("smooth facets", smooth_facets()), ("glossy", glossy())] {
+    let scenes =
+        [("plain", plain()), ("hidden lamp", hidden_lamp()), ("smooth facets", smooth_facets()), ("glossy", glossy())];
+    for (what, scene) in scenes {
         let blocks = |bidirectional, first: u64, spp| -> Vec<Vec<f64>> {
             (first..first + 8).map(|seed| block_means(&of_seed(&scene, bidirectional, seed, spp))).collect()
         };

@@ -246,6 +246,13 @@ pub struct PassContext<'a> {
     pub light_samples: u32,
 }
 
+impl PassContext<'_> {
+    /// For paths that start at lights: they are neither guided, nor gather photons, nor are connected.
+    fn for_light_paths(&self) -> Self {
+        Self { guidance: Guidance::default(), caustics: None, light_paths: None, continuations: None, ..*self }
+    }
+}
+
 /// The photons that a part of a pass traces.
 #[derive(Clone, Debug)]
 pub struct PhotonRange {

@@ -17,7 +17,7 @@ mod test_support;
 mod tree;
 
 pub use area::{AreaLight, Emission, EmittedRay};
-pub(crate) use area::{placed_area, triangle_error};
+pub(crate) use area::{placed_area, triangle_point};
 pub use directional::DirectionalLight;
 pub use environment::{Environment, EnvironmentMap, EnvironmentMapError, EnvironmentScratch};
 pub use equiangular::{Equiangular, RaySegment};

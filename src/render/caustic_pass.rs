@@ -1,16 +1,13 @@
 //! Photons of caustics: one map for each epoch of samples.
 
 use std::ops::RangeInclusive;
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
-use rayon::prelude::*;
-
+use super::Settings;
+use super::epoch::trace_parts;
 use super::tile_renderer::TileWorkspace;
-use super::{Settings, TILE_SIZE};
 use crate::accel::Accelerator;
-use crate::integrator::{
-    CausticCasters, Caustics, EPOCH, Integrator, PassContext, Photon, PhotonMap, PhotonRange, RayCounts,
-};
+use crate::integrator::{CausticCasters, Caustics, EPOCH, Integrator, PassContext, PhotonMap, PhotonRange, RayCounts};
 use crate::math::Vec2;
 use crate::sampling::{PixelSeed, Sampler};
 use crate::scene::Scene;
@@ -82,21 +79,9 @@ impl CausticPass {
         }
         // Beyond all pixels.
         let seed: PixelSeed = sampler.pixel(epoch, u32::MAX);
-        let chunk = TILE_SIZE * TILE_SIZE;
-        let parts: Vec<(Vec<Photon>, RayCounts)> = (0..self.traced.div_ceil(chunk))
-            .into_par_iter()
-            .map(|i| {
-                let range = PhotonRange { seed, indices: i * chunk..((i + 1) * chunk).min(self.traced) };
-                let thread = rayon::current_thread_index().unwrap_or(0) % workspaces.len();
-                let mut workspace = workspaces[thread].lock().unwrap_or_else(PoisonError::into_inner);
-                let mut photons = Vec::new();
-                integrator.trace_photons(pass, &self.casters, &range, &mut workspace.integrator, &mut photons);
-                (photons, std::mem::take(&mut workspace.integrator.counts))
-            })
-            .collect();
-        let mut counts = RayCounts::default();
-        parts.iter().for_each(|(_, part)| counts.add(part));
-        let photons: Vec<Photon> = parts.into_iter().flat_map(|(photons, _)| photons).collect();
+        let (photons, counts) = trace_parts(self.traced, workspaces, |indices, workspace, photons| {
+            integrator.trace_photons(pass, &self.casters, &PhotonRange { seed, indices }, workspace, photons);
+        });
         // Slower than the variance falls, so that both vanish (Knaus and Zwicker 2011, with alpha = 2/3).
         let radius = self.radius * ((epoch + 1) as f32).powf(-1.0 / 6.0);
         self.map = Some((epoch, PhotonMap::new(&photons, self.traced, radius)));

@@ -1,12 +1,11 @@
 //! Light paths: one set for each epoch of samples.
 
 use std::ops::RangeInclusive;
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
-use rayon::prelude::*;
-
+use super::Settings;
+use super::epoch::trace_parts;
 use super::tile_renderer::TileWorkspace;
-use super::{Settings, TILE_SIZE};
 use crate::integrator::{EPOCH, Emitters, Integrator, LightPaths, LightVertex, PassContext, PhotonRange, RayCounts};
 use crate::sampling::{PixelSeed, Sampler};
 use crate::scene::Scene;
@@ -65,21 +64,10 @@ impl LightPathPass {
         }
         // Beyond all pixels, and beside the photons' seeds.
         let seed: PixelSeed = sampler.pixel(epoch, u32::MAX - 1);
-        let chunk = TILE_SIZE * TILE_SIZE;
-        let parts: Vec<(Vec<LightVertex>, RayCounts)> = (0..self.traced.div_ceil(chunk))
-            .into_par_iter()
-            .map(|i| {
-                let range = PhotonRange { seed, indices: i * chunk..((i + 1) * chunk).min(self.traced) };
-                let thread = rayon::current_thread_index().unwrap_or(0) % workspaces.len();
-                let mut workspace = workspaces[thread].lock().unwrap_or_else(PoisonError::into_inner);
-                let mut vertices = Vec::new();
-                integrator.trace_light_paths(pass, &self.emitters, &range, &mut workspace.integrator, &mut vertices);
-                (vertices, std::mem::take(&mut workspace.integrator.counts))
-            })
-            .collect();
-        let mut counts = RayCounts::default();
-        parts.iter().for_each(|(_, part)| counts.add(part));
-        self.vertices = Some((epoch, parts.into_iter().flat_map(|(vertices, _)| vertices).collect()));
+        let (vertices, counts) = trace_parts(self.traced, workspaces, |indices, workspace, vertices| {
+            integrator.trace_light_paths(pass, &self.emitters, &PhotonRange { seed, indices }, workspace, vertices);
+        });
+        self.vertices = Some((epoch, vertices));
         counts
     }
 }

@@ -5,6 +5,7 @@
 
 mod caustic_pass;
 mod driver;
+mod epoch;
 mod exr_overrides;
 mod guiding_pilot;
 mod integrator_overrides;

@@ -4,9 +4,9 @@ use crate::bsdf::BsdfFlags;
 use crate::geometry::{Geometry, Hit, Shape, SpawnPoint, SurfacePoint};
 use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::integrator::world::has_part;
-use crate::light::{placed_area, triangle_error};
+use crate::light::{placed_area, triangle_point};
 use crate::math::{DVec3, Vec3};
-use crate::sampling::{AliasTable, warp};
+use crate::sampling::AliasTable;
 use crate::scene::Scene;
 
 /// Surfaces with delta lobes, chosen by area. Those that instances place are left out, as are emitters: paths find what
@@ -69,10 +69,7 @@ impl CausticCasters {
         match geometry.shape(shape) {
             Shape::Mesh(mesh) => {
                 let points = mesh.triangle_points(prim);
-                let [b, c] = warp::uniform_triangle([v, w]);
-                let [a, edge_u, edge_v] = [points.a, points.b - points.a, points.c - points.a].map(Vec3::as_dvec3);
-                let (p, n) = (a + edge_u * b + edge_v * c, points.cross().normalize().as_vec3());
-                let point = SpawnPoint { p, n, error: triangle_error(&points) };
+                let point = triangle_point(&points, [v, w]);
                 CausticPoint { shape, point, pdf_area: pmf / points.area() }
             }
             Shape::Analytic(placed) => {

@@ -6,14 +6,12 @@ use super::wave::{PathRows, Wave, path_flags};
 use super::{Context, PathBuffers, PathIntegrator, materials, scatter, trace, vertices};
 use crate::bsdf::{Bsdf, Lambert};
 use crate::color::Rgb;
-use crate::film::LightAovRequest;
 use crate::geometry::{Hit, SpawnPoint, SurfaceInteraction};
 use crate::id::{LightId, PrimId};
 use crate::integrator::bidirectional::{CONNECTIONS_PER_VERTEX, Emitters, LightVertex, PartialMis, squared};
 use crate::integrator::vertex::HemisphereTest;
 use crate::integrator::{
-    CameraBatch, CameraSample, Guidance, PassContext, PhotonRange, RayCounts, Roulette, SurfaceAovs, Workspace, cancel,
-    dimensions,
+    CameraBatch, CameraSample, PassContext, PhotonRange, RayCounts, Workspace, cancel, dimensions,
 };
 use crate::light::{EmittedRay, Light};
 use crate::math::rows::BATCH;
@@ -38,16 +36,7 @@ pub(super) fn trace(
     workspace: &mut Workspace,
     light_vertices: &mut Vec<LightVertex>,
 ) {
-    let config = &PathIntegrator {
-        roulette: Roulette::Off,
-        clamp: f32::INFINITY,
-        hide_emitters: false,
-        surface_aovs: SurfaceAovs::default(),
-        light_aovs: LightAovRequest::default(),
-        ..config.clone()
-    };
-    let pass =
-        &PassContext { guidance: Guidance::default(), caustics: None, light_paths: None, continuations: None, ..*pass };
+    let (config, pass) = (&config.for_light_paths(), &pass.for_light_paths());
     let (world, compensation) = (pass.world, config.strategy.compensation());
     let mut context = Context { config, pass, world, scene: world.scene, bounce: 0, is_last: false, compensation };
     let Workspace { counts, paths: PathBuffers(wave), .. } = workspace;

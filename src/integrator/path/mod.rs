@@ -194,6 +194,18 @@ impl PathIntegrator {
         if largest > self.clamp { light * (self.clamp / largest) } else { light }
     }
 
+    /// For paths that start at lights: without roulette and whatever concerns the camera and AOVs.
+    fn for_light_paths(&self) -> Self {
+        Self {
+            roulette: Roulette::Off,
+            clamp: f32::INFINITY,
+            hide_emitters: false,
+            surface_aovs: SurfaceAovs::default(),
+            light_aovs: LightAovRequest::default(),
+            ..self.clone()
+        }
+    }
+
     /// Whether any light AOV is requested.
     #[inline]
     fn needs_light_aovs(&self) -> bool {

@@ -5,12 +5,11 @@ use super::caustics::shading_ratio;
 use super::wave::Wave;
 use super::{Context, PathBuffers, PathIntegrator, materials, media, scatter, trace, vertices};
 use crate::color::Rgb;
-use crate::film::LightAovRequest;
 use crate::geometry::Hit;
 use crate::id::LightId;
 use crate::integrator::{
-    CameraBatch, CameraSample, CausticCasters, CausticPoint, Guidance, PassContext, Photon, PhotonRange, RayCounts,
-    Roulette, SurfaceAovs, Workspace, cancel, dimensions,
+    CameraBatch, CameraSample, CausticCasters, CausticPoint, PassContext, Photon, PhotonRange, RayCounts, Workspace,
+    cancel, dimensions,
 };
 use crate::light::{LightSampleContext, ShadowTarget};
 use crate::math::rows::BATCH;
@@ -44,16 +43,7 @@ pub(super) fn trace(
     photons: &mut Vec<Photon>,
 ) {
     // No roulette: what a photon loses at mirrors and glass is little.
-    let config = &PathIntegrator {
-        roulette: Roulette::Off,
-        clamp: f32::INFINITY,
-        hide_emitters: false,
-        surface_aovs: SurfaceAovs::default(),
-        light_aovs: LightAovRequest::default(),
-        ..config.clone()
-    };
-    let pass =
-        &PassContext { guidance: Guidance::default(), caustics: None, light_paths: None, continuations: None, ..*pass };
+    let (config, pass) = (&config.for_light_paths(), &pass.for_light_paths());
     let (world, compensation) = (pass.world, config.strategy.compensation());
     let mut context = Context { config, pass, world, scene: world.scene, bounce: 0, is_last: false, compensation };
     let Workspace { counts, paths: PathBuffers(wave), .. } = workspace;

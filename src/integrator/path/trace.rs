@@ -9,7 +9,7 @@ use crate::math::rows::BATCH;
 
 /// Finds the closest hits of all rays.
 pub(super) fn closest(context: &Context, wave: &mut Wave, counts: &mut RayCounts) {
-    let is_camera = context.bounce == 0;
+    let is_camera = context.bounce == 0 && wave.light_paths.is_empty();
     *(if is_camera { &mut counts.camera } else { &mut counts.indirect }) += wave.count as u64;
     let coherence = if is_camera { Coherence::Coherent } else { Coherence::Incoherent };
     for block in 0..wave.blocks() {

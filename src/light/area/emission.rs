@@ -2,7 +2,7 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use super::{AreaLight, EmitterShape, triangle_error};
+use super::{AreaLight, EmitterShape, triangle_point};
 use crate::color::Rgb;
 use crate::geometry::{Geometry, Shape, SpawnPoint};
 use crate::id::PrimId;
@@ -66,11 +66,7 @@ impl AreaLight {
                 let is_second = halves && u[0] >= 0.5;
                 let v = if halves { [2.0 * u[0] - f32::from(u8::from(is_second)), u[1]] } else { u };
                 let prim = if is_second { PrimId(1) } else { self.prim };
-                let points = mesh.triangle_points(prim);
-                let [b, c] = warp::uniform_triangle(v);
-                let [a, edge_u, edge_v] = [points.a, points.b - points.a, points.c - points.a].map(Vec3::as_dvec3);
-                let (p, n) = (a + edge_u * b + edge_v * c, points.cross().normalize().as_vec3());
-                Some(SpawnPoint { p, n, error: triangle_error(&points) })
+                Some(triangle_point(&mesh.triangle_points(prim), v))
             }
             Shape::Analytic(placed) => {
                 let sample = placed.sample_area(u);

@@ -16,7 +16,8 @@ use parallelogram::ParallelogramEmitter;
 pub(super) use queue::AreaQueue;
 use sphere::SphereEmitter;
 use triangle::TriangleEmitter;
-pub(crate) use triangle::triangle_error;
+use triangle::triangle_error;
+pub(crate) use triangle::triangle_point;
 
 use super::bounds::{EmissionCone, LightBounds, to_positive};
 use super::{LightSample, ShadowTarget};

@@ -1,7 +1,7 @@
 //! Triangles, sampled by area.
 
 use super::EmitterSample;
-use crate::geometry::TrianglePoints;
+use crate::geometry::{SpawnPoint, TrianglePoints};
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{DVec3, Vec3};
 use crate::sampling::warp;
@@ -21,9 +21,17 @@ pub(super) struct TriangleEmitter {
 /// The error that [`SurfaceInteraction::error`](crate::geometry::SurfaceInteraction::error) states for a hit of a
 /// triangle, for all its points: four units of roundoff of its extent. More for a sliver, since nobody confirms that a
 /// shadow ray ends before it.
-pub(crate) fn triangle_error(points: &TrianglePoints) -> f32 {
+pub(super) fn triangle_error(points: &TrianglePoints) -> f32 {
     let error = 4.0 * UNIT_ROUNDOFF as f32 * points.bounds().size().max_element();
     if points.is_sliver() { error * 0.5 * points.flatness() as f32 } else { error }
+}
+
+/// A point of a triangle, uniform over its area, with the unit normal of its front.
+pub(crate) fn triangle_point(points: &TrianglePoints, u: [f32; 2]) -> SpawnPoint {
+    let [b, c] = warp::uniform_triangle(u);
+    let [a, edge_u, edge_v] = [points.a, points.b - points.a, points.c - points.a].map(Vec3::as_dvec3);
+    let (p, n) = (a + edge_u * b + edge_v * c, points.cross().normalize().as_vec3());
+    SpawnPoint { p, n, error: triangle_error(points) }
 }
 
 impl TriangleEmitter {
