@@ -25,29 +25,41 @@ use crate::math::{Frame, Vec3};
 /// constant is unbiased.
 pub const CONNECTIONS_PER_VERTEX: f64 = 0.4;
 
-/// Where a light path meets a surface.
+/// Where a light path meets a surface. Aligned, so that it is in two lines of the caches.
 #[derive(Clone, Debug)]
+#[repr(align(128))]
 pub struct LightVertex {
     /// The point, with its geometric normal.
     pub point: SpawnPoint,
-    /// The shading frame.
-    pub frame: Frame,
-    /// Unit direction to where the light comes from, in the frame.
-    pub wi: Vec3,
-    /// Cosine of this direction with the geometric normal.
+    /// The shading normal.
+    pub n: Vec3,
+    /// Cosine of the direction to where the light comes from with the geometric normal.
     pub cos_geometric: f32,
+    /// The same with the shading normal.
+    pub cos_shading: f32,
     /// Cosine of the shading and the geometric normal where a normal or bump map makes them differ, else zero.
     pub cos_normals: f32,
-    /// Flux that arrives, times the number of light paths.
+    /// Flux that arrives, times the number of light paths; at diffuse surfaces that which leaves them.
     pub flux: Rgb,
-    /// How light is scattered.
-    pub bsdf: Bsdf,
+    /// How light is scattered; `None` at diffuse surfaces.
+    pub scattering: Option<Box<Scattering>>,
     /// The light that it comes from.
     pub light: LightId,
     /// Segments from the light.
     pub segments: u32,
     /// What other strategies weigh.
     pub mis: PartialMis,
+}
+
+/// How light is scattered at a vertex.
+#[derive(Clone, Debug)]
+pub struct Scattering {
+    /// The shading frame.
+    pub frame: Frame,
+    /// Unit direction to where the light comes from, in the frame.
+    pub wi: Vec3,
+    /// The BSDF.
+    pub bsdf: Bsdf,
 }
 
 /// Sums of the squared densities of other strategies over that of a path's own, as of its last vertex (dVCM and dVC of
@@ -58,6 +70,14 @@ pub struct PartialMis {
     pub d_vcm: f64,
     /// Of those that end it earlier, likewise.
     pub d_vc: f64,
+}
+
+impl PartialMis {
+    /// The sum of all, where scattering chooses the direction back with this density.
+    #[inline(always)]
+    pub fn sum(self, reversed_pdf: f32) -> f64 {
+        self.d_vcm + self.d_vc * squared(reversed_pdf)
+    }
 }
 
 /// The light paths of an epoch.
@@ -73,13 +93,13 @@ pub struct LightPaths<'a> {
 
 /// A sum of squared densities of other strategies, for a weight of `1 / (1 + sum)`: finite, and 0 where it is not a
 /// number, as where one density overflows and another is 0.
-#[inline]
+#[inline(always)]
 pub fn bounded(sum: f64) -> f64 {
     if sum > 0.0 { sum.min(f64::MAX) } else { 0.0 }
 }
 
 /// The square, in which densities are compared (power heuristic).
-#[inline]
+#[inline(always)]
 pub fn squared(ratio: f32) -> f64 {
     let ratio = f64::from(ratio);
     ratio * ratio

@@ -1,74 +1,48 @@
-//! Connections of a block's vertices to vertices of light paths, and the weights of other strategies beside them.
+//! Connections of a block's vertices to vertices of light paths.
+
+use std::f32::consts::FRAC_1_PI;
 
 use super::Context;
-use super::block::{VertexRows, Vertices, spawn, vertex_flags};
+use super::block::{DirectRows, EvalRows, PointRows, VertexRows, Vertices, spawn, vertex_flags};
+use super::connection_mis::{ConnectionMis, MisRows};
 use super::direct::{self, shadowing};
 use super::evals::Surfaces;
-use super::wave::{PathRows, Wave};
+use super::wave::Wave;
 use crate::color::Rgb;
 use crate::geometry::SpawnPoint;
-use crate::id::LightId;
-use crate::integrator::bidirectional::{CONNECTIONS_PER_VERTEX, LightPaths, LightVertex, PartialMis, bounded, squared};
+use crate::integrator::bidirectional::{LightVertex, PartialMis, Scattering, bounded, squared};
 use crate::integrator::dimensions;
 use crate::integrator::vertex::HemisphereTest;
-use crate::light::light_target;
+use crate::light::LightSampleRows;
 use crate::math::Vec3;
-use crate::math::rows::BATCH;
+use crate::math::prefetch::prefetch;
+use crate::math::rows::{BATCH, Row, soa};
+use crate::math::vectorize::vectorize;
 
-/// What a path from the camera remembers of other strategies.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct ConnectionState {
-    /// As of the last vertex.
-    d_vc: f64,
-    /// Whether the last vertex can be connected to this one.
-    is_connectable: bool,
-}
-
-impl ConnectionState {
-    /// The sums of other strategies where the path arrives.
-    fn arrived(self, rows: &VertexRows, lane: usize, paths: &PathRows, path: usize) -> PartialMis {
-        let cos = squared(rows.cos_geometric[lane]);
-        let d_vcm =
-            if self.is_connectable { squared(rows.t[lane] * rows.t[lane] / paths.pdf[path]) / cos } else { 0.0 };
-        PartialMis { d_vcm, d_vc: self.d_vc / cos }
+soa! {
+    /// Vertices of light paths, one for each vertex of a block.
+    pub(super) struct LightVertexRows {
+        /// Whether the vertices can be connected.
+        is_chosen: u32,
+        /// The next seven as in [`LightVertex`].
+        n: Vec3,
+        error: f32,
+        n_s: Vec3,
+        cos_geometric: f32,
+        cos_shading: f32,
+        cos_normals: f32,
+        flux: Rgb,
+        light: u32,
+        segments: u32,
+        /// Cosine of the direction to the block's vertex with the shading normal.
+        cos_out: f32,
+        distance_squared: f32,
+        /// The BSDF, for light towards the block's vertex.
+        value: Rgb,
+        /// The densities with which scattering chooses the direction to the light, and that to the block's vertex.
+        pdf_to_light: f32,
+        pdf_to_vertex: f32,
     }
-
-    /// What connections add to the sum of the squared densities over that of meeting the light of a surface by chance.
-    #[inline]
-    pub fn of_emission(&self, context: &Context, id: LightId, n: Vec3) -> f64 {
-        let Some(LightPaths { emitters, .. }) = context.pass.light_paths else { return 0.0 };
-        if self.d_vc == 0.0 {
-            return 0.0;
-        }
-        let pdf = squared(emitters.pdf_per_cos(context.scene, id, n));
-        bounded(pdf * CONNECTIONS_PER_VERTEX * CONNECTIONS_PER_VERTEX * self.d_vc)
-    }
-}
-
-/// The state of the path that goes on from a vertex.
-pub(super) fn after(
-    context: &Context,
-    vertices: &Vertices,
-    lane: usize,
-    paths: &PathRows,
-    state: ConnectionState,
-) -> ConnectionState {
-    let Vertices { rows, scatter, .. } = vertices;
-    let cos = scatter.direction.get(lane).dot(rows.n_g.get(lane));
-    let mis = state.arrived(rows, lane, paths, vertices.path(lane));
-    if scatter.is_delta[lane] != 0 {
-        return ConnectionState { d_vc: mis.d_vc * squared(cos), is_connectable: false };
-    }
-    let wi = scatter.wi.get(lane);
-    let test = HemisphereTest::new([rows.wo.0[2][lane], wi.z], [rows.cos_geometric[lane], cos]);
-    if !test.agrees() {
-        // Light paths do not take this way.
-        return ConnectionState::default();
-    }
-    let back = vertices.reversed_eval(context.scene, lane, wi).pdf;
-    let d_vc = squared(cos / scatter.pdf[lane]) * (mis.d_vc * squared(back) + mis.d_vcm);
-    let d_vc = if d_vc.is_finite() { d_vc } else { 0.0 };
-    ConnectionState { d_vc, is_connectable: true }
 }
 
 /// Connects each vertex of a block to one of a light path, and queues the shadow rays between them.
@@ -78,34 +52,34 @@ pub(super) fn sample(context: &Context, wave: &mut Wave, block: usize) {
         return;
     }
     draw(context, wave);
-    let Wave { vertices, paths, connections, bsdf_rows, .. } = wave;
-    let count = vertices.count.min(BATCH);
-    let all = light_paths.vertices;
-    let chosen = choose(context, vertices, all);
-    let Vertices { rows, light_samples, light_evals, bsdfs, non_diffuse, .. } = &mut *vertices;
-    let surfaces = Surfaces { scene: context.scene, count, rows, bsdfs, non_diffuse };
-    surfaces.eval(&light_samples.direction, |lane| chosen[lane].is_some(), bsdf_rows, light_evals);
-    let per_path = all.len() as f32 / light_paths.traced as f32;
-    for (lane, &vertex) in chosen.iter().enumerate().take(count) {
-        let path = vertices.path(lane);
-        let light = vertex.and_then(|vertex| {
-            let mis = connections[block * BATCH + path].arrived(&vertices.rows, lane, &paths[block], path);
-            Connection { context, vertices, lane, mis, vertex }.contribution()
-        });
-        let (Some(vertex), Some(light)) = (vertex, light) else {
-            vertices.direct.status[lane] = spawn::NONE;
-            continue;
-        };
-        let light = context.config.clamped(light * per_path, context.bounce + 1 + vertex.segments);
-        let (p, n) = (vertices.points.p.get(lane), vertices.rows.n_g.get(lane));
-        let ray = SpawnPoint { p, n, error: vertices.rows.error[lane] }.ray_to(&vertex.point);
-        let direct = &mut vertices.direct;
-        direct.status[lane] = spawn::SPAWNED;
-        direct.contribution.set(lane, light);
-        direct.shadow_origin.set(lane, ray.origin);
-        direct.shadow_direction.set(lane, ray.direction);
-        direct.shadow_end[lane] = ray.t_max;
-        vertices.light_samples.light[lane] = vertex.light.0;
+    let scatterings = choose(context, wave, light_paths.vertices);
+    let Wave { vertices, connection_ends: ends, connection_mis, bsdf_rows, .. } = wave;
+    let Vertices { count, rows, points, light_samples, light_evals, direct, bsdfs, non_diffuse, .. } = vertices;
+    vectorize!(find_directions(points, light_samples, ends, *count));
+    for (lane, scattering) in scatterings.iter().enumerate().take(*count) {
+        if let Some(scattering) = scattering {
+            scatter_light(scattering, -light_samples.direction.get(lane), ends, lane);
+        }
+    }
+    let surfaces = Surfaces { scene: context.scene, count: *count, rows, bsdfs, non_diffuse };
+    let is_wanted = |lane: usize| ends.is_chosen[lane] != 0;
+    surfaces.eval(&light_samples.direction, is_wanted, bsdf_rows, light_evals);
+    let ConnectionMis { mis, densities } = connection_mis;
+    surfaces.reversed_pdfs(&light_evals.wi, is_wanted, bsdf_rows, &mut densities.reversed);
+    let per_path = light_paths.vertices.len() as f32 / light_paths.traced as f32;
+    let pairs = Pairs { rows, points, lights: light_samples, evals: light_evals, ends, mis, per_path };
+    if context.scene.features.normal_perturbations {
+        vectorize!(connect::<true>(&pairs, &densities.reversed, direct, *count));
+    } else {
+        vectorize!(connect::<false>(&pairs, &densities.reversed, direct, *count));
+    }
+    light_samples.light = ends.light;
+    if context.config.clamp.is_finite() {
+        for lane in 0..(*count).min(BATCH) {
+            let scatterings = context.bounce + 1 + ends.segments[lane];
+            let contribution = context.config.clamped(direct.contribution.get(lane), scatterings);
+            direct.contribution.set(lane, contribution);
+        }
     }
     if let Some(grid) = context.pass.continuations {
         direct::roulette(grid, vertices);
@@ -114,99 +88,121 @@ pub(super) fn sample(context: &Context, wave: &mut Wave, block: usize) {
     wave.queue_shadow_rays(context, block, 1);
 }
 
-/// A vertex of a light path for each vertex, if they can be connected, and the directions to them.
-fn choose<'a>(context: &Context, vertices: &mut Vertices, all: &'a [LightVertex]) -> [Option<&'a LightVertex>; BATCH] {
-    let mut chosen = [None; BATCH];
-    for (lane, chosen) in chosen.iter_mut().enumerate().take(vertices.count) {
-        let [u, digits, ..] = vertices.u_light.of(lane);
-        // Random numbers are multiples of 2^-24.
-        let u = f64::from(u) + f64::from(digits) * (1.0 / 16_777_216.0);
-        let vertex = &all[((u * all.len() as f64) as usize).min(all.len() - 1)];
-        let is_short = context.bounce + 2 + vertex.segments <= context.config.max_depth;
-        let toward = (vertex.point.p - vertices.points.p.get(lane)).as_vec3();
-        let is_apart = toward.length_squared() > 0.0;
-        let is_wanted = is_short && is_apart && vertices.rows.flags[lane] & vertex_flags::UNSAMPLED == 0;
-        vertices.light_samples.direction.set(lane, if is_wanted { toward.normalize() } else { Vec3::Z });
-        *chosen = is_wanted.then_some(vertex);
-    }
-    chosen
-}
-
 /// Draws the numbers that choose light vertices.
 fn draw(context: &Context, wave: &mut Wave) {
     let Vertices { requests, count, u_light, .. } = &mut wave.vertices;
     context.config.sampler.sample_4d_batch(requests, *count, dimensions::connection(context.bounce), u_light);
 }
 
-/// A vertex of a camera path, and one of a light path.
-struct Connection<'a> {
-    context: &'a Context<'a>,
-    vertices: &'a Vertices,
-    lane: usize,
-    /// Of the camera path.
-    mis: PartialMis,
-    vertex: &'a LightVertex,
+/// Chooses a vertex of a light path for each vertex, if they can be connected; the result is how those that are not
+/// diffuse scatter light.
+fn choose<'a>(context: &Context, wave: &mut Wave, all: &'a [LightVertex]) -> [Option<&'a Scattering>; BATCH] {
+    let Wave { vertices, connection_ends: ends, connection_mis: ConnectionMis { mis, .. }, .. } = wave;
+    let mut indices = [0; BATCH];
+    for (lane, index) in indices.iter_mut().enumerate().take(vertices.count) {
+        let [u, digits, ..] = vertices.u_light.of(lane);
+        // Random numbers are multiples of 2^-24.
+        let u = f64::from(u) + f64::from(digits) * (1.0 / 16_777_216.0);
+        *index = ((u * all.len() as f64) as usize).min(all.len() - 1);
+        prefetch(all, *index);
+    }
+    let mut scatterings = [None; BATCH];
+    for (lane, scattering) in scatterings.iter_mut().enumerate().take(vertices.count) {
+        let vertex = &all[indices[lane]];
+        let is_short = context.bounce + 2 + vertex.segments <= context.config.max_depth;
+        let is_chosen = is_short && vertices.rows.flags[lane] & vertex_flags::UNSAMPLED == 0;
+        ends.is_chosen[lane] = u32::from(is_chosen);
+        *scattering = vertex.scattering.as_deref().filter(|_| is_chosen);
+        vertices.points.target_p.set(lane, vertex.point.p);
+        ends.n.set(lane, vertex.point.n);
+        ends.error[lane] = vertex.point.error;
+        ends.n_s.set(lane, vertex.n);
+        (ends.cos_geometric[lane], ends.cos_shading[lane]) = (vertex.cos_geometric, vertex.cos_shading);
+        ends.cos_normals[lane] = vertex.cos_normals;
+        ends.flux.set(lane, vertex.flux);
+        (ends.light[lane], ends.segments[lane]) = (vertex.light.0, vertex.segments);
+        (mis.light_d_vcm[lane], mis.light_d_vc[lane]) = (vertex.mis.d_vcm, vertex.mis.d_vc);
+    }
+    scatterings
 }
 
-impl Connection<'_> {
-    /// The light of the light path that reaches the camera if nothing is between the vertices, weighted by MIS, times
-    /// the number of light paths over that of vertices; `None` without any.
-    fn contribution(&self) -> Option<Rgb> {
-        let Self { context, vertices, lane, mis, vertex } = *self;
-        let Vertices { rows, light_samples, light_evals, .. } = vertices;
-        let (direction, wi) = (light_samples.direction.get(lane), light_evals.wi.get(lane));
-        let cos = direction.dot(rows.n_g.get(lane));
-        let test = HemisphereTest::new([rows.wo.0[2][lane], wi.z], [rows.cos_geometric[lane], cos]);
-        let out = vertex.frame.to_local(-direction);
-        let cos_light = -direction.dot(vertex.point.n);
-        let light_test = HemisphereTest::new([vertex.wi.z, out.z], [vertex.cos_geometric, cos_light]);
-        let value = light_evals.value.get(lane);
-        if !test.agrees() || !light_test.agrees() || value.is_black() {
-            return None;
-        }
-        let toward_light = vertex.bsdf.eval(out, vertex.wi);
-        let factor = shadowing::<true>(test, [cos, wi.z, rows.cos_normals[lane]])
-            * shadowing::<true>(light_test, [vertex.cos_geometric, vertex.wi.z, vertex.cos_normals]);
-        let distance_squared = (vertex.point.p - vertices.points.p.get(lane)).length_squared() as f32;
-        let geometry = factor * cos_light.abs() / (distance_squared * vertex.cos_geometric.abs());
-        let light = rows.throughput.get(lane) * value * toward_light.value * vertex.flux * geometry;
-        if light.is_black() || !light.is_finite() {
-            return None;
-        }
-        let toward_vertex = vertex.bsdf.eval(vertex.wi, out).pdf;
-        let back = vertices.reversed_eval(context.scene, lane, wi).pdf;
-        let by_camera = squared(light_evals.pdf[lane] * cos_light / distance_squared)
-            * (vertex.mis.d_vcm + vertex.mis.d_vc * squared(toward_light.pdf));
-        let by_light = squared(toward_vertex * cos / distance_squared) * (mis.d_vcm + mis.d_vc * squared(back));
-        Some(light * (1.0 / (1.0 + bounded(by_camera + by_light))) as f32)
+/// Finds the directions to the chosen vertices, and how these scatter light if they are diffuse.
+#[inline(always)]
+fn find_directions(points: &PointRows, lights: &mut LightSampleRows, ends: &mut LightVertexRows, count: usize) {
+    for i in 0..count.min(BATCH) {
+        let toward = (points.target_p.get(i) - points.p.get(i)).as_vec3();
+        let distance_squared = toward.length_squared();
+        let is_apart = distance_squared > 0.0;
+        ends.is_chosen[i] &= u32::from(is_apart);
+        let direction = if is_apart { toward * (1.0 / distance_squared.sqrt()) } else { Vec3::Z };
+        lights.direction.set(i, direction);
+        ends.distance_squared[i] = distance_squared;
+        let cos_out = -direction.dot(ends.n_s.get(i));
+        ends.cos_out[i] = cos_out;
+        let is_same_side = cos_out * ends.cos_shading[i] > 0.0;
+        let cos = if is_same_side { ends.cos_shading[i].abs() } else { 0.0 };
+        ends.pdf_to_light[i] = FRAC_1_PI * cos;
+        ends.pdf_to_vertex[i] = if is_same_side { FRAC_1_PI * cos_out.abs() } else { 0.0 };
+        ends.value.set(i, Rgb::splat(FRAC_1_PI * cos));
     }
 }
 
-/// Weighs light samples against connections too.
-pub(super) fn reweigh_light_samples(context: &Context, wave: &mut Wave, block: usize) {
-    let Some(LightPaths { emitters, .. }) = context.pass.light_paths else { return };
-    let samples = f64::from(context.light_samples());
-    let Wave { vertices, paths, connections, .. } = wave;
-    for lane in 0..vertices.count.min(BATCH) {
-        let Vertices { rows, light_samples: lights, light_evals: evals, direct, .. } = &*vertices;
-        if direct.status[lane] != spawn::SPAWNED || lights.target[lane] != light_target::POINT {
-            continue;
-        }
-        let path = vertices.path(lane);
-        let mis = connections[block * BATCH + path].arrived(rows, lane, &paths[block], path);
-        if lights.is_delta[lane] != 0 || (mis.d_vcm == 0.0 && mis.d_vc == 0.0) {
-            continue;
-        }
-        let wi = evals.wi.get(lane);
-        let cos = lights.direction.get(lane).dot(rows.n_g.get(lane));
-        let start = emitters.pdf_per_cos(context.scene, LightId(lights.light[lane]), lights.target_n.get(lane));
-        let back = vertices.reversed_eval(context.scene, lane, wi).pdf;
-        let pdf = f64::from(lights.pdf[lane]) * samples;
-        let connections = squared(start * cos) * CONNECTIONS_PER_VERTEX * CONNECTIONS_PER_VERTEX / (pdf * pdf)
-            * (mis.d_vcm + mis.d_vc * squared(back));
-        let others = 1.0 + squared(evals.pdf[lane]) / (pdf * pdf);
-        let factor = (1.0 / (1.0 + bounded(connections / others))) as f32;
-        let contribution = direct.contribution.get(lane) * factor;
-        vertices.direct.contribution.set(lane, contribution);
+/// Finds how a vertex that is not diffuse scatters light in a direction.
+fn scatter_light(scattering: &Scattering, direction: Vec3, ends: &mut LightVertexRows, lane: usize) {
+    let Scattering { frame, wi, bsdf } = scattering;
+    let out = frame.to_local(direction);
+    let toward_light = bsdf.eval(out, *wi);
+    ends.value.set(lane, toward_light.value);
+    ends.pdf_to_light[lane] = toward_light.pdf;
+    ends.pdf_to_vertex[lane] = bsdf.eval(*wi, out).pdf;
+}
+
+/// Vertices of a block, and the vertices of light paths that they are connected to.
+struct Pairs<'a> {
+    rows: &'a VertexRows,
+    points: &'a PointRows,
+    lights: &'a LightSampleRows,
+    evals: &'a EvalRows,
+    ends: &'a LightVertexRows,
+    mis: &'a MisRows,
+    /// Vertices of a light path.
+    per_path: f32,
+}
+
+/// Finds the light that reaches the camera if nothing is between the vertices, weighted by MIS, and the rays between
+/// them.
+#[inline(always)]
+fn connect<const PERTURBED: bool>(pairs: &Pairs, reversed: &Row, direct: &mut DirectRows, count: usize) {
+    let Pairs { rows, points, lights, evals, ends, mis, per_path } = *pairs;
+    for i in 0..count.min(BATCH) {
+        let direction = lights.direction.get(i);
+        let cos_local = evals.wi.0[2][i];
+        let cos = direction.dot(rows.n_g.get(i));
+        let test = HemisphereTest::new([rows.wo.0[2][i], cos_local], [rows.cos_geometric[i], cos]);
+        let cos_light = -direction.dot(ends.n.get(i));
+        let light_test =
+            HemisphereTest::new([ends.cos_shading[i], ends.cos_out[i]], [ends.cos_geometric[i], cos_light]);
+        let factor = shadowing::<PERTURBED>(test, [cos, cos_local, rows.cos_normals[i]])
+            * shadowing::<PERTURBED>(light_test, [ends.cos_geometric[i], ends.cos_shading[i], ends.cos_normals[i]]);
+        let distance_squared = ends.distance_squared[i];
+        let geometry = factor * cos_light.abs() / (distance_squared * ends.cos_geometric[i].abs());
+        let light = rows.throughput.get(i) * evals.value.get(i) * ends.value.get(i) * ends.flux.get(i) * geometry;
+
+        let of_light = PartialMis { d_vcm: mis.light_d_vcm[i], d_vc: mis.light_d_vc[i] };
+        let of_camera = PartialMis { d_vcm: mis.d_vcm[i], d_vc: mis.d_vc[i] };
+        let by_camera = squared(evals.pdf[i] * cos_light / distance_squared) * of_light.sum(ends.pdf_to_light[i]);
+        let by_light = squared(ends.pdf_to_vertex[i] * cos / distance_squared) * of_camera.sum(reversed[i]);
+        let weight = (1.0 / (1.0 + bounded(by_camera + by_light))) as f32;
+        let contribution = light * (weight * per_path);
+        direct.contribution.set(i, contribution);
+        let is_lit = (ends.is_chosen[i] != 0) & !contribution.is_black() & contribution.is_finite();
+        direct.status[i] = spawn::status(is_lit & test.agrees() & light_test.agrees(), false);
+
+        let start = SpawnPoint { p: points.p.get(i), n: rows.n_g.get(i), error: rows.error[i] };
+        let end = SpawnPoint { p: points.target_p.get(i), n: ends.n.get(i), error: ends.error[i] };
+        let ray = start.ray_to(&end);
+        direct.shadow_origin.set(i, ray.origin);
+        direct.shadow_direction.set(i, ray.direction);
+        direct.shadow_end[i] = ray.t_max;
     }
 }

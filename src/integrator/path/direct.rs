@@ -65,7 +65,7 @@ fn sample_once(context: &Context, regions: Option<&Regions>, wave: &mut Wave, bl
     } else {
         vectorize!(illuminate::<false>(rows, points, lights, evals, direct, weighting, count));
     }
-    super::connections::reweigh_light_samples(context, wave, block);
+    super::connection_mis::reweigh_light_samples(context, wave);
     if let Some(grid) = context.pass.continuations {
         roulette(grid, &mut wave.vertices);
     }

@@ -2,7 +2,7 @@
 
 use super::Context;
 use super::caustics::CausticState;
-use super::connections::ConnectionState;
+use super::connection_mis::ConnectionState;
 use super::equiangular::{DirectionPdfs, SegmentVertex};
 use super::radiance::Output;
 use super::wave::{PathRows, Wave};

@@ -3,9 +3,9 @@
 use super::block::{EvalRows, VertexRows};
 use super::materials::BsdfTable;
 use super::wave::BsdfScratch;
-use crate::bsdf::Lambert;
+use crate::bsdf::{BsdfEvalRows, Lambert};
 use crate::math::Frame;
-use crate::math::rows::{BATCH, Vec3Rows};
+use crate::math::rows::{BATCH, Row, Vec3Rows};
 use crate::math::vectorize::vectorize;
 use crate::scene::Scene;
 
@@ -19,6 +19,12 @@ pub(super) struct Surfaces<'a> {
     pub non_diffuse: &'a [u8],
 }
 
+/// Local directions at the vertices of a block.
+struct Directions<'a> {
+    wo: &'a Vec3Rows,
+    wi: &'a Vec3Rows,
+}
+
 impl Surfaces<'_> {
     /// Evaluates the BSDFs for the directions of the vertices that are wanted.
     pub fn eval(
@@ -29,6 +35,37 @@ impl Surfaces<'_> {
         evals: &mut EvalRows,
     ) {
         vectorize!(eval_diffuse(self.rows, directions, evals, self.count));
+        let EvalRows { wi, value, pdf } = evals;
+        self.eval_non_diffuse(Directions { wo: &self.rows.wo, wi }, is_wanted, scratch, |results, i, lane| {
+            value.set(lane, results.value.get(i));
+            pdf[lane] = results.pdf[i];
+        });
+    }
+
+    /// The densities with which scattering chooses the directions back from the local directions `wi`.
+    pub fn reversed_pdfs(
+        &self,
+        wi: &Vec3Rows,
+        is_wanted: impl Fn(usize) -> bool,
+        scratch: &mut BsdfScratch,
+        pdfs: &mut Row,
+    ) {
+        vectorize!(reversed_diffuse_pdfs(self.rows, wi, pdfs, self.count));
+        self.eval_non_diffuse(Directions { wo: wi, wi: &self.rows.wo }, is_wanted, scratch, |results, i, lane| {
+            pdfs[lane] = results.pdf[i];
+        });
+    }
+
+    /// Evaluates the BSDFs of the vertices that are wanted and not diffuse: `set` gets their results, with the index
+    /// among them and the vertex.
+    #[inline(always)]
+    fn eval_non_diffuse(
+        &self,
+        directions: Directions,
+        is_wanted: impl Fn(usize) -> bool,
+        scratch: &mut BsdfScratch,
+        mut set: impl FnMut(&BsdfEvalRows, usize, usize),
+    ) {
         let BsdfScratch { lanes, queries, evals: results, .. } = scratch;
         for group in self.bsdfs.groups(self.non_diffuse) {
             lanes.clear();
@@ -37,8 +74,8 @@ impl Surfaces<'_> {
                 continue;
             };
             for (i, &lane) in lanes.iter().enumerate() {
-                queries.wo.set(i, self.rows.wo.get(usize::from(lane)));
-                queries.wi.set(i, evals.wi.get(usize::from(lane)));
+                queries.wo.set(i, directions.wo.get(usize::from(lane)));
+                queries.wi.set(i, directions.wi.get(usize::from(lane)));
             }
             let varies = self.bsdfs.varies(usize::from(lanes[0]));
             if varies {
@@ -46,8 +83,7 @@ impl Surfaces<'_> {
             }
             bsdf.eval_rows(queries, varies, lanes.len(), results);
             for (i, &lane) in lanes.iter().enumerate() {
-                evals.value.set(usize::from(lane), results.value.get(i));
-                evals.pdf[usize::from(lane)] = results.pdf[i];
+                set(results, i, usize::from(lane));
             }
         }
     }
@@ -62,5 +98,12 @@ fn eval_diffuse(rows: &VertexRows, directions: &Vec3Rows, evals: &mut EvalRows, 
         evals.wi.set(i, wi);
         evals.value.set(i, eval.value);
         evals.pdf[i] = eval.pdf;
+    }
+}
+
+#[inline(always)]
+fn reversed_diffuse_pdfs(rows: &VertexRows, wi: &Vec3Rows, pdfs: &mut Row, count: usize) {
+    for i in 0..count.min(BATCH) {
+        pdfs[i] = Lambert { albedo: rows.albedo.get(i) }.eval(wi.get(i), rows.wo.get(i)).pdf;
     }
 }

@@ -4,11 +4,12 @@ use super::block::{Vertices, spawn, vertex_flags};
 use super::direct::shadowing;
 use super::wave::{PathRows, Wave, path_flags};
 use super::{Context, PathBuffers, PathIntegrator, materials, scatter, trace, vertices};
-use crate::bsdf::{Bsdf, Lambert};
 use crate::color::Rgb;
 use crate::geometry::{Hit, SpawnPoint, SurfaceInteraction};
 use crate::id::{LightId, PrimId};
-use crate::integrator::bidirectional::{CONNECTIONS_PER_VERTEX, Emitters, LightVertex, PartialMis, squared};
+use crate::integrator::bidirectional::{
+    CONNECTIONS_PER_VERTEX, Emitters, LightVertex, PartialMis, Scattering, squared,
+};
 use crate::integrator::vertex::HemisphereTest;
 use crate::integrator::{
     CameraBatch, CameraSample, PassContext, PhotonRange, RayCounts, Workspace, cancel, dimensions,
@@ -112,27 +113,28 @@ fn advance(context: &Context, wave: &mut Wave, block: usize, light_vertices: &mu
         let state = &mut light_paths[block * BATCH + path];
         let mis = arrived(context, vertices, lane, &paths[block], state);
         if vertices.rows.flags[lane] & vertex_flags::DELTA == 0 {
-            light_vertices.push(LightVertex {
-                point: SpawnPoint {
-                    p: vertices.points.p.get(lane),
-                    n: vertices.rows.n_g.get(lane),
-                    error: vertices.rows.error[lane],
-                },
-                frame: vertices.frame(lane),
-                wi: vertices.rows.wo.get(lane),
-                cos_geometric: vertices.rows.cos_geometric[lane],
-                cos_normals: vertices.rows.cos_normals[lane],
-                flux: vertices.rows.throughput.get(lane),
-                bsdf: match vertices.bsdfs.get(context.scene, lane) {
-                    None => Bsdf::Lambert(Lambert { albedo: vertices.albedo(lane) }),
-                    Some(bsdf) => bsdf.clone(),
-                },
-                light: state.light,
-                segments: context.bounce + 1,
-                mis,
-            });
+            light_vertices.push(light_vertex(context, vertices, lane, mis, state.light));
         }
         scatter_light(context, vertices, lane, mis, state);
+    }
+}
+
+/// What is stored of a vertex of a light path.
+fn light_vertex(context: &Context, vertices: &Vertices, lane: usize, mis: PartialMis, light: LightId) -> LightVertex {
+    let rows = &vertices.rows;
+    let (flux, frame, wi) = (rows.throughput.get(lane), vertices.frame(lane), rows.wo.get(lane));
+    let bsdf = vertices.bsdfs.get(context.scene, lane);
+    LightVertex {
+        point: SpawnPoint { p: vertices.points.p.get(lane), n: rows.n_g.get(lane), error: rows.error[lane] },
+        n: frame.z,
+        cos_geometric: rows.cos_geometric[lane],
+        cos_shading: wi.z,
+        cos_normals: rows.cos_normals[lane],
+        flux: if bsdf.is_some() { flux } else { flux * vertices.albedo(lane) },
+        scattering: bsdf.map(|bsdf| Box::new(Scattering { frame, wi, bsdf: bsdf.clone() })),
+        light,
+        segments: context.bounce + 1,
+        mis,
     }
 }
 
@@ -199,7 +201,7 @@ fn scatter_light(context: &Context, vertices: &mut Vertices, lane: usize, mis: P
         let test = HemisphereTest::new([wi.z, out.z], [rows.cos_geometric[lane], cos_out]);
         let factor = shadowing::<true>(test, [rows.cos_geometric[lane], wi.z, rows.cos_normals[lane]]);
         let weight = (cos_out / (rows.cos_geometric[lane] * pdf)).abs() * factor;
-        let d_vc = squared(cos_out / pdf) * (mis.d_vc * squared(toward.pdf) + mis.d_vcm);
+        let d_vc = squared(cos_out / pdf) * mis.sum(toward.pdf);
         (flux * toward.value * weight, d_vc)
     };
     state.d_vc = d_vc;

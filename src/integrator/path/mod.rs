@@ -8,6 +8,7 @@
 
 mod block;
 mod caustics;
+mod connection_mis;
 mod connections;
 mod continuations;
 mod direct;
@@ -251,7 +252,10 @@ impl PathIntegrator {
                 vertices::build_frames(context, wave);
                 wave.draw(context);
                 let regions = guide.map(|guide| Regions::find(guide, &wave.vertices));
-                connections::sample(context, wave, block);
+                if !wave.connections.is_empty() {
+                    connection_mis::arrive(wave, block);
+                    connections::sample(context, wave, block);
+                }
                 direct::sample(context, regions.as_ref(), wave, block);
                 caustics::gather(context, wave, block, out);
                 scatter::sample(context, regions.as_ref(), wave, block);

@@ -2,7 +2,8 @@
 
 use super::block::{Vertices, spawn};
 use super::caustics::CausticState;
-use super::connections::ConnectionState;
+use super::connection_mis::{ConnectionMis, ConnectionState};
+use super::connections::LightVertexRows;
 use super::continuations::ContinuationRecorder;
 use super::guided::GuideRecorder;
 use super::light_aovs::{LightAovs, PathMove};
@@ -144,6 +145,8 @@ pub(super) struct Wave {
     pub photons: Vec<PhotonState>,
     /// By path, where paths are connected to light paths.
     pub connections: Vec<ConnectionState>,
+    pub connection_mis: ConnectionMis,
+    pub connection_ends: LightVertexRows,
     /// By light path, where the wave is one of light paths.
     pub light_paths: Vec<LightPathState>,
     pub light_aovs: LightAovs,
@@ -243,6 +246,9 @@ impl Wave {
         if lanes.is_empty() {
             return survivors;
         }
+        if !self.connections.is_empty() {
+            super::connection_mis::leave(context, self);
+        }
         if self.has_optional_columns() || context.needs_aov_state() {
             self.append_optional(context, block, survivors);
         }
@@ -322,7 +328,17 @@ impl Wave {
     /// Moves the state that only some renders have.
     fn append_optional(&mut self, context: &Context, block: usize, survivors: usize) {
         let Self {
-            vertices, paths, media, walks, cones, caustics, photons, connections, light_paths, light_aovs, ..
+            vertices,
+            media,
+            walks,
+            cones,
+            caustics,
+            photons,
+            connections,
+            connection_mis,
+            light_paths,
+            light_aovs,
+            ..
         } = self;
         let scatter = &vertices.scatter;
         let lanes = (0..vertices.count).filter(|&lane| scatter.status[lane] == spawn::SPAWNED);
@@ -344,8 +360,8 @@ impl Wave {
             if let Some(&state) = photons.get(path) {
                 photons[to] = super::photons::after(vertices, lane, state);
             }
-            if let Some(&state) = connections.get(path) {
-                connections[to] = super::connections::after(context, vertices, lane, &paths[block], state);
+            if to < connections.len() {
+                connections[to] = connection_mis.after(lane);
             }
             if let Some(&state) = light_paths.get(path) {
                 light_paths[to] = state;
