@@ -3,7 +3,7 @@
 
 use serde_json::{Value, json};
 use steradian::Error;
-use steradian::desc::{CausticsDesc, GuidingDesc};
+use steradian::desc::{AutoDesc, CausticsDesc};
 use steradian::internal::accel::AccelKind;
 use steradian::internal::film::{Image, LayerKind};
 use steradian::internal::render::{self, Overrides};
@@ -97,12 +97,12 @@ fn glossy() -> Value {
     )
 }
 
-fn of(scene: &Value, bidirectional: bool, overrides: &Overrides) -> Image {
-    let overrides = Overrides { bidirectional: Some(bidirectional), ..overrides.clone() };
+fn of(scene: &Value, bidirectional: impl Into<AutoDesc>, overrides: &Overrides) -> Image {
+    let overrides = Overrides { bidirectional: Some(bidirectional.into()), ..overrides.clone() };
     render_with(&prepare(scene, &overrides), AccelKind::EMBREE).image
 }
 
-fn of_seed(scene: &Value, bidirectional: bool, seed: u64, spp: u32) -> Image {
+fn of_seed(scene: &Value, bidirectional: impl Into<AutoDesc>, seed: u64, spp: u32) -> Image {
     of(scene, bidirectional, &Overrides { seed: Some(seed), spp: Some(spp), ..Overrides::default() })
 }
 
@@ -152,7 +152,8 @@ fn weights_do_not_depend_on_the_unit_of_length() {
         for shape in scene["shapes"].as_array_mut().unwrap() {
             ["origin", "edge_u", "edge_v"].into_iter().for_each(|key| scale(&mut shape[key]));
         }
-        let prepared = prepare(&scene, &Overrides { bidirectional: Some(true), spp: Some(8), ..Overrides::default() });
+        let prepared =
+            prepare(&scene, &Overrides { bidirectional: Some(AutoDesc::On), spp: Some(8), ..Overrides::default() });
         let result = render_with(&prepared, AccelKind::EMBREE);
         assert_eq!(result.stats.nan_samples, 0, "{unit}");
         let blocks = block_means(&result.image);
@@ -177,7 +178,8 @@ fn bidirectional_pictures_do_not_depend_on_threads() {
 
 #[test]
 fn bidirectional_renders_are_resumed_split_and_replayed() {
-    let overrides = Overrides { bidirectional: Some(true), spp: Some(21), threads: Some(2), ..Overrides::default() };
+    let overrides =
+        Overrides { bidirectional: Some(AutoDesc::On), spp: Some(21), threads: Some(2), ..Overrides::default() };
     assert_resumed_split_and_replayed(&plain(), &overrides);
 }
 
@@ -190,6 +192,36 @@ fn layers_of_bidirectional_pictures_sum_to_them() {
     }
 }
 
+/// A square that faces a lamp: all light is direct.
+fn without_indirect_light() -> Value {
+    let mut scene = plain();
+    scene["shapes"] = json!([
+        { "type": "quad", "material": "white", "origin": [-3, 0, 3], "edge_u": [6, 0, 0], "edge_v": [0, 0, -6] },
+        { "type": "quad", "material": "white", "origin": [-1, 3, -1], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2],
+          "emission": { "radiance": [20, 18, 14] } }
+    ]);
+    scene
+}
+
+#[test]
+fn a_pilot_decides_where_light_paths_are_worth_their_time() {
+    for (scene, is_worth_it) in [(plain(), true), (without_indirect_light(), false)] {
+        let [auto, on, off] =
+            [AutoDesc::Auto, AutoDesc::On, AutoDesc::Off].map(|choice| of_seed(&scene, choice, 0, 16));
+        assert_ne!(on, off);
+        assert_eq!(auto, if is_worth_it { on } else { off });
+        // So few samples are not worth a pilot.
+        let [auto, off] = [AutoDesc::Auto, AutoDesc::Off].map(|choice| of_seed(&scene, choice, 0, 15));
+        assert_eq!(auto, off);
+    }
+}
+
+#[test]
+fn renders_are_resumed_split_and_replayed_after_a_pilot() {
+    let overrides = Overrides { bidirectional: Some(AutoDesc::Auto), spp: Some(21), ..Overrides::default() };
+    assert_resumed_split_and_replayed(&plain(), &overrides);
+}
+
 #[test]
 fn what_light_paths_cannot_do_is_refused() {
     let refusal = |scene: &Value, overrides: &Overrides| {
@@ -199,13 +231,16 @@ fn what_light_paths_cannot_do_is_refused() {
             other => panic!("{other:?}"),
         }
     };
-    let on = Overrides { bidirectional: Some(true), ..Overrides::default() };
+    let on = Overrides { bidirectional: Some(AutoDesc::On), ..Overrides::default() };
     for (overrides, option) in [
         (Overrides { target_error: Some(0.01), ..on.clone() }, "`target_error`"),
-        (Overrides { guiding: Some(GuidingDesc::On), ..on.clone() }, "`guiding`"),
+        (Overrides { guiding: Some(AutoDesc::On), ..on.clone() }, "`guiding`"),
         (Overrides { regularize: Some(0.1), ..on.clone() }, "`regularize`"),
         (Overrides { caustics: Some(CausticsDesc::Photons), ..on.clone() }, "`caustics`"),
     ] {
+        let desc = serde_json::from_value(plain()).unwrap();
+        let auto = Overrides { bidirectional: Some(AutoDesc::Auto), ..overrides.clone() };
+        assert!(render::Settings::new(&desc, &auto).is_ok(), "{option}");
         let message = refusal(&plain(), &overrides);
         assert!(message.starts_with("`bidirectional`") && message.contains(option), "{message}");
     }

@@ -3,7 +3,7 @@
 
 use serde_json::{Value, json};
 use steradian::Error;
-use steradian::desc::{CausticsDesc, GuidingDesc};
+use steradian::desc::{AutoDesc, CausticsDesc};
 use steradian::internal::accel::AccelKind;
 use steradian::internal::film::{Image, LayerKind};
 use steradian::internal::render::{self, Overrides};
@@ -202,7 +202,7 @@ fn what_photons_cannot_do_is_refused() {
     let on = Overrides { caustics: Some(CausticsDesc::Photons), ..Overrides::default() };
     for (overrides, option) in [
         (Overrides { target_error: Some(0.01), ..on.clone() }, "`target_error`"),
-        (Overrides { guiding: Some(GuidingDesc::On), ..on.clone() }, "`guiding`"),
+        (Overrides { guiding: Some(AutoDesc::On), ..on.clone() }, "`guiding`"),
         (Overrides { regularize: Some(0.1), ..on.clone() }, "`regularize`"),
     ] {
         let message = refusal(&balls(), &overrides);

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use serde_json::{Value, json};
 use steradian::Error;
-use steradian::desc::GuidingDesc;
+use steradian::desc::AutoDesc;
 use steradian::internal::accel::{self, AccelKind};
 use steradian::internal::film::{Image, LayerKind};
 use steradian::internal::math::Rng;
@@ -61,7 +61,7 @@ pub fn room_with_shaft(width: f64) -> Value {
     json!({
         "camera": { "position": [-1.6, 1.2, 1.7], "look_at": [0.8, 0.2, -1.0], "vertical_fov_degrees": 60 },
         "film": { "width": 240, "height": 240, "filter": { "type": "box" } },
-        "integrator": { "type": "path", "max_depth": 8 },
+        "integrator": { "type": "path", "max_depth": 8, "bidirectional": "off" },
         "materials": { "white": { "type": "diffuse", "albedo": 0.6 }, "black": { "type": "diffuse", "albedo": 0 } },
         "shapes": walls_and(vec![
             wall(-half, -half, [2.0 * half, 0.0, 0.0]),
@@ -121,7 +121,7 @@ fn guided_pictures_do_not_depend_on_threads() {
         .map(|threads| {
             let overrides = Overrides {
                 threads: Some(threads),
-                guiding: Some(GuidingDesc::On),
+                guiding: Some(AutoDesc::On),
                 spp: Some(24),
                 ..Overrides::default()
             };
@@ -184,7 +184,7 @@ fn what_guiding_cannot_do_is_refused() {
             other => panic!("{other:?}"),
         }
     };
-    let on = Overrides { guiding: Some(GuidingDesc::On), ..Overrides::default() };
+    let on = Overrides { guiding: Some(AutoDesc::On), ..Overrides::default() };
     assert!(refusal(&room(), &Overrides { target_error: Some(0.01), ..on.clone() }).starts_with("`target_error`"));
     let mut normals = room();
     normals["integrator"] = json!({ "type": "normal" });
@@ -198,7 +198,7 @@ fn what_guiding_cannot_do_is_refused() {
 fn kit(scene: &Value, spp: u32) -> Kit {
     Kit::new(
         scene,
-        &Overrides { guiding: Some(GuidingDesc::On), spp: Some(spp), threads: Some(2), ..Overrides::default() },
+        &Overrides { guiding: Some(AutoDesc::On), spp: Some(spp), threads: Some(2), ..Overrides::default() },
     )
 }
 

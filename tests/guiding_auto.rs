@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
 use serde_json::{Value, json};
-use steradian::desc::GuidingDesc;
+use steradian::desc::AutoDesc;
 use steradian::internal::accel::{self, AccelKind};
 use steradian::internal::film::Image;
 use steradian::internal::math::Rng;
@@ -44,11 +44,11 @@ fn easy() -> Value {
     })
 }
 
-fn overrides(guiding: GuidingDesc, spp: u32) -> Overrides {
+fn overrides(guiding: AutoDesc, spp: u32) -> Overrides {
     Overrides { guiding: Some(guiding), spp: Some(spp), threads: Some(2), ..Overrides::default() }
 }
 
-fn kit(scene: &Value, guiding: GuidingDesc, spp: u32) -> Kit {
+fn kit(scene: &Value, guiding: AutoDesc, spp: u32) -> Kit {
     Kit::new(scene, &overrides(guiding, spp))
 }
 
@@ -60,14 +60,14 @@ fn picture(scene: &Value, overrides: &Overrides) -> Image {
 /// The hard scene without guiding.
 fn hard_unguided() -> &'static Image {
     static IMAGE: OnceLock<Image> = OnceLock::new();
-    IMAGE.get_or_init(|| picture(&hard(), &overrides(GuidingDesc::Off, SPP)))
+    IMAGE.get_or_init(|| picture(&hard(), &overrides(AutoDesc::Off, SPP)))
 }
 
 #[test]
 fn an_easy_scene_keeps_its_bits() {
-    let auto = kit(&easy(), GuidingDesc::Auto, SPP);
+    let auto = kit(&easy(), AutoDesc::Auto, SPP);
     assert!(auto.prepared.settings.has_guiding_pilot());
-    let [auto, off] = [auto, kit(&easy(), GuidingDesc::Off, SPP)].map(|kit| kit.render(Shard::WHOLE));
+    let [auto, off] = [auto, kit(&easy(), AutoDesc::Off, SPP)].map(|kit| kit.render(Shard::WHOLE));
     assert!(bits(&auto.film) == bits(&off.film));
     // The pilot takes rays of its own, few of them.
     let [with, without] = [auto.rays.total(), off.rays.total()].map(|rays| rays as f64);
@@ -76,7 +76,7 @@ fn an_easy_scene_keeps_its_bits() {
 
 #[test]
 fn a_hard_scene_is_guided_alike_by_any_number_of_threads() {
-    let of = |threads| picture(&hard(), &Overrides { threads: Some(threads), ..overrides(GuidingDesc::Auto, SPP) });
+    let of = |threads| picture(&hard(), &Overrides { threads: Some(threads), ..overrides(AutoDesc::Auto, SPP) });
     let one = of(1);
     assert!(one == of(3));
     assert!(one != *hard_unguided());
@@ -88,7 +88,7 @@ fn a_resumed_render_has_the_bits_of_one_run() {
     let folder = tempfile::tempdir().unwrap();
     let file = StateFile::take(&folder.path().join("a.state")).unwrap();
     for scene in [hard(), easy()] {
-        let [first, second] = [SPP, SPP + 21].map(|spp| kit(&scene, GuidingDesc::Auto, spp));
+        let [first, second] = [SPP, SPP + 21].map(|spp| kit(&scene, AutoDesc::Auto, spp));
         let reference = second.render(Shard::WHOLE);
         let tiles = reference.film.tiles().len();
         let mut rng = Rng::new(11);
@@ -117,7 +117,7 @@ fn a_resumed_render_has_the_bits_of_one_run() {
 fn states_that_are_guided_against_their_settings_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.state");
-    let kits = [GuidingDesc::Off, GuidingDesc::Auto, GuidingDesc::On].map(|guiding| kit(&hard(), guiding, SPP));
+    let kits = [AutoDesc::Off, AutoDesc::Auto, AutoDesc::On].map(|guiding| kit(&hard(), guiding, SPP));
     let refusal = |written: &Kit, settings: &Kit| {
         let header = settings.header(Shard::WHOLE);
         written.start(Shard::WHOLE).write(&header, std::fs::File::create(&path).unwrap()).unwrap();
@@ -142,7 +142,7 @@ fn a_guided_picture_has_the_same_mean() {
         let picture = |seed| picture(&hard(), &Overrides { seed: Some(seed), ..overrides(guiding, SPP) });
         (first..first + 8).map(|seed| block_means(&picture(seed))).collect()
     };
-    let [mut guided, mut plain] = [blocks(GuidingDesc::Auto, 1), blocks(GuidingDesc::Off, 101)];
+    let [mut guided, mut plain] = [blocks(AutoDesc::Auto, 1), blocks(AutoDesc::Off, 101)];
     // What is nearly black is lit in few of them.
     let sum = |block: usize| guided.iter().chain(&plain).map(|means| means[block]).sum::<f64>();
     let largest = (0..plain[0].len()).map(sum).fold(0.0, f64::max);
@@ -159,7 +159,7 @@ fn a_guided_picture_has_the_same_mean() {
 #[test]
 fn shards_are_not_guided() {
     let folder = tempfile::tempdir().unwrap();
-    let mut kit = kit(&hard(), GuidingDesc::Auto, SPP);
+    let mut kit = kit(&hard(), AutoDesc::Auto, SPP);
     let shards = (1..=2).map(|index| Shard { index, count: 2 });
     kit.prepared.settings = kit.prepared.settings.of_shard(Shard { index: 1, count: 2 });
     let paths: Vec<_> = shards
@@ -181,11 +181,11 @@ fn pilots_are_traced_only_where_they_can_pay() {
         change(&mut scene);
         Kit::new(&scene, &overrides).prepared.settings.has_guiding_pilot()
     };
-    let auto = || overrides(GuidingDesc::Auto, SPP);
+    let auto = || overrides(AutoDesc::Auto, SPP);
     let same = |_: &mut Value| {};
     assert!(has_pilot(&same, auto()));
-    assert!(!has_pilot(&same, overrides(GuidingDesc::Auto, SPP - 1)));
-    assert!(!has_pilot(&same, overrides(GuidingDesc::On, SPP)));
+    assert!(!has_pilot(&same, overrides(AutoDesc::Auto, SPP - 1)));
+    assert!(!has_pilot(&same, overrides(AutoDesc::On, SPP)));
     // It is the default.
     assert!(has_pilot(&same, Overrides { guiding: None, ..auto() }));
     assert!(!has_pilot(&same, Overrides { target_error: Some(0.01), ..auto() }));
@@ -199,7 +199,7 @@ fn pilots_are_traced_only_where_they_can_pay() {
 /// Those before have the same numbers with and without a pilot.
 #[test]
 fn samples_are_replayed_without_guiding() {
-    let [auto, off] = [GuidingDesc::Auto, GuidingDesc::Off].map(|guiding| {
+    let [auto, off] = [AutoDesc::Auto, AutoDesc::Off].map(|guiding| {
         let kit = kit(&hard(), guiding, SPP);
         let scene = &kit.prepared.scene;
         let accel = accel::build(AccelKind::EMBREE, &scene.geometry, 1).unwrap();
@@ -213,7 +213,7 @@ fn samples_are_replayed_without_guiding() {
 fn crops_have_pilots_of_their_own() {
     let crop = |threads| {
         let overrides =
-            Overrides { crop: Some([10, 21, 71, 67]), threads: Some(threads), ..overrides(GuidingDesc::Auto, 2 * SPP) };
+            Overrides { crop: Some([10, 21, 71, 67]), threads: Some(threads), ..overrides(AutoDesc::Auto, 2 * SPP) };
         picture(&hard(), &overrides)
     };
     let image = crop(2);

@@ -44,7 +44,7 @@ pub(crate) use principled::principled_parameters;
 pub use principled::{PrincipledDesc, PrincipledModelDesc, SubsurfaceMethodDesc};
 pub use relief::{BumpMapDesc, NormalMapDesc};
 pub use settings::{
-    CausticsDesc, DEFAULT_RR_DEPTH, FilmDesc, FilterDesc, FilterSamplesDesc, GuidingDesc, IntegratorDesc,
+    AutoDesc, CausticsDesc, DEFAULT_RR_DEPTH, FilmDesc, FilterDesc, FilterSamplesDesc, IntegratorDesc,
     MAX_FILTER_RADIUS, MAX_SIDE, RouletteDesc, SamplerDesc, SamplerKindDesc, StrategyDesc,
 };
 pub use shape::{

@@ -244,16 +244,21 @@ pub enum IntegratorDesc {
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         hide_emitters: bool,
         /// Whether paths learn from earlier ones where light comes from: less noise where most of it comes by few ways,
-        /// such as through a door ajar, for some time of learning. Default: auto.
-        #[serde(default, skip_serializing_if = "GuidingDesc::is_default")]
-        guiding: GuidingDesc,
+        /// such as through a door ajar, for some time of learning. on: from the second sample of each pixel on, as long
+        /// as it pays. auto: from the ninth sample on, as long as it lowers the error by more than it costs, which a
+        /// pilot and samples with and without it show; never with fewer than 128 samples of each, with a target error
+        /// or photons, or in shards. Default: auto.
+        #[serde(default, skip_serializing_if = "AutoDesc::is_default")]
+        guiding: AutoDesc,
         /// How caustics are found: light that mirrors and clear glass throw on other surfaces. Default: paths.
         #[serde(default, skip_serializing_if = "CausticsDesc::is_default")]
         caustics: CausticsDesc,
         /// Whether paths are also connected to paths from the lights: less noise where lamps shine at walls, ceilings
-        /// and lampshades rather than at what is seen, for about twice the time. Default: false.
-        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-        bidirectional: bool,
+        /// and lampshades rather than at what is seen, for one and a half to twice the time. auto: if a pilot shows
+        /// that it lowers the error by more than it costs; never with fewer than 16 samples of each pixel, or with
+        /// options that it does not support. Default: auto.
+        #[serde(default, skip_serializing_if = "AutoDesc::is_default")]
+        bidirectional: AutoDesc,
     },
     /// Whitted's ray tracing: mirror reflection, refraction, direct illumination by every light, and an ambient term.
     Whitted {
@@ -314,9 +319,9 @@ impl IntegratorDesc {
             clamp: None,
             regularize: None,
             hide_emitters: false,
-            guiding: GuidingDesc::default(),
+            guiding: AutoDesc::default(),
             caustics: CausticsDesc::default(),
-            bidirectional: false,
+            bidirectional: AutoDesc::default(),
         }
     }
 
@@ -394,23 +399,20 @@ pub enum RouletteDesc {
     Off,
 }
 
-/// Whether paths are guided by what earlier ones have learned of the light. All give the same picture; they differ in
-/// noise and time.
+/// Whether something is used that changes noise and time, but not the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum GuidingDesc {
+pub enum AutoDesc {
     /// Never.
     Off,
-    /// From the ninth sample of each pixel on, as long as it lowers the error by more than it costs, which a pilot and
-    /// samples with and without it show. Never with fewer than 128 samples of each, with a target error or photons, or
-    /// in shards.
+    /// Where it lowers the error by more than it costs.
     #[default]
     Auto,
-    /// From the second sample of each pixel on, as long as it pays.
+    /// Wherever it can be.
     On,
 }
 
-impl GuidingDesc {
+impl AutoDesc {
     const NAMES: [&str; 3] = ["off", "auto", "on"];
 
     fn is_default(&self) -> bool {
@@ -418,34 +420,34 @@ impl GuidingDesc {
     }
 }
 
-impl From<bool> for GuidingDesc {
+impl From<bool> for AutoDesc {
     fn from(is_on: bool) -> Self {
         if is_on { Self::On } else { Self::Off }
     }
 }
 
 /// By name; `true` is `on`, `false` is `off`.
-impl<'de> Deserialize<'de> for GuidingDesc {
+impl<'de> Deserialize<'de> for AutoDesc {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct NameOrSwitch;
 
         impl Visitor<'_> for NameOrSwitch {
-            type Value = GuidingDesc;
+            type Value = AutoDesc;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str("off, auto or on")
             }
 
-            fn visit_bool<E: Error>(self, is_on: bool) -> Result<GuidingDesc, E> {
+            fn visit_bool<E: Error>(self, is_on: bool) -> Result<AutoDesc, E> {
                 Ok(is_on.into())
             }
 
-            fn visit_str<E: Error>(self, name: &str) -> Result<GuidingDesc, E> {
+            fn visit_str<E: Error>(self, name: &str) -> Result<AutoDesc, E> {
                 match name {
-                    "off" => Ok(GuidingDesc::Off),
-                    "auto" => Ok(GuidingDesc::Auto),
-                    "on" => Ok(GuidingDesc::On),
-                    _ => Err(E::unknown_variant(name, &GuidingDesc::NAMES)),
+                    "off" => Ok(AutoDesc::Off),
+                    "auto" => Ok(AutoDesc::Auto),
+                    "on" => Ok(AutoDesc::On),
+                    _ => Err(E::unknown_variant(name, &AutoDesc::NAMES)),
                 }
             }
         }

@@ -277,6 +277,12 @@ impl Workspace {
     pub fn second_moments(&self) -> Vec<SecondMoments> {
         self.paths.second_moments(&self.out)
     }
+
+    /// How much larger the second moments of the last batch's samples would be without connections to light paths, by
+    /// channel, if these asked for it.
+    pub fn excess_moments(&self) -> &[[f64; 3]] {
+        self.paths.excess_moments()
+    }
 }
 
 /// Estimates the radiance of camera samples.

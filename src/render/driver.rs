@@ -99,7 +99,8 @@ impl Driver<'_> {
         let mut stats = Stats::default();
         state.start(self.session);
         // Its rays are of no sample: a resumed render and a shard trace it again.
-        self.pool.install(|| self.renderer.prepare(&self.workspaces));
+        self.pool.install(|| self.renderer.prepare(&self.workspaces, state.bidirectional));
+        state.set_bidirectional(self.renderer.is_bidirectional());
         let all = state.film.tiles().len();
         let mut size =
             PassSize { samples: 1, tiles: if self.max_pass_time().is_some() { FIRST_TILES.min(all) } else { all } };

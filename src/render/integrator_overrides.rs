@@ -2,7 +2,7 @@
 
 use super::Overrides;
 use super::settings::refused;
-use crate::desc::{CausticsDesc, DEFAULT_RR_DEPTH, GuidingDesc, IntegratorDesc, RouletteDesc, SceneDesc, StrategyDesc};
+use crate::desc::{AutoDesc, CausticsDesc, DEFAULT_RR_DEPTH, IntegratorDesc, RouletteDesc, SceneDesc, StrategyDesc};
 use crate::error::Result;
 
 /// The integrator of a scene, with the parameters that settings change.
@@ -76,7 +76,7 @@ fn set_guiding(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Result
     if let Some(chosen) = overrides.guiding {
         match integrator {
             IntegratorDesc::Path { guiding, .. } => *guiding = chosen,
-            _ if chosen == GuidingDesc::On => {
+            _ if chosen == AutoDesc::On => {
                 return Err(refused("guiding", ": only the integrator path can be guided"));
             }
             _ => {}
@@ -87,9 +87,9 @@ fn set_guiding(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Result
             return Err(refused("guide", ": only the integrator path can be guided"));
         };
         // The guide is not trained further, whatever the scene says.
-        *guiding = GuidingDesc::Off;
+        *guiding = AutoDesc::Off;
     }
-    if matches!(integrator, IntegratorDesc::Path { guiding: GuidingDesc::On, .. }) && overrides.target_error.is_some() {
+    if matches!(integrator, IntegratorDesc::Path { guiding: AutoDesc::On, .. }) && overrides.target_error.is_some() {
         return Err(refused(
             "target_error",
             ": not with guiding; give `guide`, `guiding` off, or `spp` or `time_limit` in its place",
@@ -121,11 +121,17 @@ fn set_bidirectional(integrator: &mut IntegratorDesc, overrides: &Overrides) -> 
         };
         *bidirectional = chosen;
     }
-    let IntegratorDesc::Path { bidirectional: true, caustics, .. } = integrator else { return Ok(()) };
+    let IntegratorDesc::Path { caustics, .. } = integrator else { return Ok(()) };
     let photons = (*caustics == CausticsDesc::Photons).then_some("`caustics` photons");
-    match photons.or_else(|| unsupported_with_light_paths(integrator, overrides)) {
-        Some(option) => {
-            Err(refused("bidirectional", format!(": unsupported with {option}; give `bidirectional` false")))
+    let unsupported = photons.or_else(|| unsupported_with_light_paths(integrator, overrides));
+    let IntegratorDesc::Path { bidirectional, .. } = integrator else { return Ok(()) };
+    match unsupported {
+        Some(option) if *bidirectional == AutoDesc::On => {
+            Err(refused("bidirectional", format!(": unsupported with {option}; give `bidirectional` off")))
+        }
+        Some(_) => {
+            *bidirectional = AutoDesc::Off;
+            Ok(())
         }
         None => Ok(()),
     }
@@ -137,7 +143,7 @@ fn unsupported_with_light_paths(integrator: &IntegratorDesc, overrides: &Overrid
     let options = [
         (*strategy != StrategyDesc::Mis, "`strategy` other than mis"),
         (regularize.is_some(), "`regularize`"),
-        (*guiding == GuidingDesc::On, "`guiding` on"),
+        (*guiding == AutoDesc::On, "`guiding` on"),
         (overrides.guide.is_some(), "`guide`"),
         (overrides.target_error.is_some(), "`target_error`"),
     ];

@@ -19,6 +19,11 @@ const PATHS: RangeInclusive<f64> = 16_384.0..=250_000.0;
 /// Traces light paths and keeps those of one epoch.
 pub(super) struct LightPathPass {
     emitters: Emitters,
+    /// Whether it is still to be decided if paths are connected to them.
+    pub needs_pilot: bool,
+    /// Whether they are those of the pilot.
+    is_pilot: bool,
+    /// Light paths of an epoch.
     traced: u32,
     /// The epoch, and the vertices of its paths.
     vertices: Option<(u32, Vec<LightVertex>)>,
@@ -27,6 +32,10 @@ pub(super) struct LightPathPass {
 impl LightPathPass {
     /// For a scene; `None` if no light path can start in it.
     pub fn new(scene: &Scene, settings: &Settings) -> Option<Self> {
+        let choice = settings.bidirectional();
+        if choice == Some(false) {
+            return None;
+        }
         let features = &scene.features;
         let unsupported = [
             (features.media, "media"),
@@ -34,19 +43,32 @@ impl LightPathPass {
             (features.motion, "motion while the shutter is open"),
         ];
         if let Some((_, what)) = unsupported.into_iter().find(|(is_there, _)| *is_there) {
-            tracing::warn!("bidirectional path tracing does not support {what}: paths are not connected");
+            if choice == Some(true) {
+                tracing::warn!("bidirectional path tracing does not support {what}: paths are not connected");
+            }
             return None;
         }
         let emitters = Emitters::new(scene)?;
         let [width, height] = settings.size.map(f64::from);
         let traced = (PATHS_PER_PIXEL * width * height).clamp(*PATHS.start(), *PATHS.end()) as u32;
-        Some(Self { emitters, traced, vertices: None })
+        Some(Self { emitters, needs_pilot: choice.is_none(), is_pilot: false, traced, vertices: None })
+    }
+
+    /// As many light paths as a pilot needs.
+    pub fn for_pilot(&self) -> Self {
+        let traced = self.traced.min(*PATHS.start() as u32);
+        Self { emitters: self.emitters.clone(), needs_pilot: false, is_pilot: true, traced, vertices: None }
+    }
+
+    /// Light paths of an epoch over those of the pilot.
+    pub fn per_pilot_path(&self) -> f64 {
+        f64::from(self.traced) / f64::from(self.for_pilot().traced)
     }
 
     /// What paths are connected to, if there is anything.
     pub fn light_paths(&self) -> Option<LightPaths<'_>> {
         let (_, vertices) = self.vertices.as_ref().filter(|(_, vertices)| !vertices.is_empty())?;
-        Some(LightPaths { emitters: &self.emitters, vertices, traced: self.traced })
+        Some(LightPaths { emitters: &self.emitters, vertices, traced: self.traced, has_moments: self.is_pilot })
     }
 
     /// Traces the light paths of a sample's epoch, unless they are there; the result is the rays traced.

@@ -3,6 +3,7 @@
 //! A batch is one sample index of one tile of the full film's grid, whatever the crop, the threads or the passes; so
 //! every sample can be replayed alone, and any split of the work gives the same picture bit for bit.
 
+mod bidirectional_pilot;
 mod caustic_pass;
 mod driver;
 mod epoch;
@@ -10,7 +11,9 @@ mod exr_overrides;
 mod guiding_pilot;
 mod integrator_overrides;
 mod light_path_pass;
+mod outputs;
 mod overrides;
+mod pilot_samples;
 mod pixel_order;
 mod planner;
 mod progress;
@@ -179,7 +182,7 @@ pub fn replay(
     }
     let mut renderer = TileRenderer::new(scene, accel, settings);
     let workspace = [Mutex::<TileWorkspace>::default()];
-    renderer.prepare(&workspace);
+    renderer.prepare(&workspace, None);
     renderer.trace_photons(sample, &workspace);
     let [workspace] = workspace;
     let mut workspace = workspace.into_inner().unwrap_or_else(PoisonError::into_inner);

@@ -5,7 +5,7 @@ use serde::Deserialize;
 use super::{ExrOverrides, TrainedGuide};
 use crate::accel::AccelKind;
 use crate::desc::{
-    CausticsDesc, GuidingDesc, IntegratorDesc, LayerKind, RouletteDesc, SamplerKindDesc, StrategyDesc, ViewDesc,
+    AutoDesc, CausticsDesc, IntegratorDesc, LayerKind, RouletteDesc, SamplerKindDesc, StrategyDesc, ViewDesc,
 };
 
 /// Settings of a render that replace the scene's; `None` keeps the value of the scene.
@@ -51,9 +51,9 @@ pub struct Overrides {
     /// How caustics are found.
     pub caustics: Option<CausticsDesc>,
     /// Whether paths are connected to paths from the lights.
-    pub bidirectional: Option<bool>,
+    pub bidirectional: Option<AutoDesc>,
     /// Whether paths are guided by what earlier ones have learned.
-    pub guiding: Option<GuidingDesc>,
+    pub guiding: Option<AutoDesc>,
     /// Paths are guided by it, and do not train it.
     #[serde(skip)]
     pub guide: Option<TrainedGuide>,

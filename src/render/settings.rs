@@ -7,15 +7,15 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::integrator_overrides::integrator;
-use super::{ExrOverrides, GuidingStage, Overrides, Shard, TrainedGuide};
+use super::outputs::outputs;
+use super::{GuidingStage, Overrides, Shard, TrainedGuide};
 use crate::accel::AccelKind;
 use crate::desc::{
-    CausticsDesc, FilterDesc, GuidingDesc, IntegratorDesc, LayerKind, MAX_SIDE, OutputDesc, PixelTypeDesc, SceneDesc,
-    StrategyDesc, ViewDesc,
+    AutoDesc, CausticsDesc, FilterDesc, IntegratorDesc, LayerKind, MAX_SIDE, OutputDesc, SceneDesc, StrategyDesc,
+    ViewDesc,
 };
 use crate::error::{Error, Result};
 use crate::film::{Crop, LayerSet};
-use crate::output::check_output;
 use crate::sampling::SamplerKind;
 
 /// Extensions of the files written if neither the scene nor the command line names one.
@@ -26,6 +26,13 @@ const MOST_SAMPLES: u32 = 1 << 16;
 
 /// More threads than this are a slip of the keyboard.
 const MAX_THREADS: usize = 4096;
+
+/// A pilot decides on bidirectional path tracing only of pictures with at least as many samples per pixel, so that it
+/// costs little.
+const LEAST_BIDIRECTIONAL_SPP: u32 = 16;
+
+/// And with paths of at least as many segments: others have no connections.
+const LEAST_BIDIRECTIONAL_DEPTH: u32 = 3;
 
 /// A pilot decides on guiding only of pictures with at least as many samples per pixel, so that it costs little,
 const LEAST_GUIDED_SPP: u32 = 128;
@@ -129,29 +136,32 @@ impl Settings {
         matches!(self.integrator, IntegratorDesc::Path { caustics: CausticsDesc::Photons, .. })
     }
 
-    /// Whether samples share what is traced from the lights.
-    pub(crate) fn has_epochs(&self) -> bool {
-        self.gathers_photons() || self.is_bidirectional()
-    }
-
-    /// Whether paths are connected to light paths.
-    pub(crate) fn is_bidirectional(&self) -> bool {
-        matches!(self.integrator, IntegratorDesc::Path { bidirectional: true, .. })
+    /// Whether paths are connected to light paths: `None` if a pilot decides.
+    pub(crate) fn bidirectional(&self) -> Option<bool> {
+        match self.integrator {
+            IntegratorDesc::Path { bidirectional: AutoDesc::On, .. } => Some(true),
+            IntegratorDesc::Path { bidirectional: AutoDesc::Auto, max_depth, .. }
+                if self.spp >= LEAST_BIDIRECTIONAL_SPP && max_depth >= LEAST_BIDIRECTIONAL_DEPTH =>
+            {
+                None
+            }
+            _ => Some(false),
+        }
     }
 
     /// Whether paths train a guide in any case: a sample then depends on all that were before.
     pub fn is_guided(&self) -> bool {
-        matches!(self.integrator, IntegratorDesc::Path { guiding: GuidingDesc::On, .. })
+        matches!(self.integrator, IntegratorDesc::Path { guiding: AutoDesc::On, .. })
     }
 
     /// For a part of the samples. What a pilot decides would depend on those of other parts: without a trained guide,
     /// shards are not guided.
     #[must_use]
     pub fn of_shard(mut self, shard: Shard) -> Self {
-        if let IntegratorDesc::Path { guiding: guiding @ GuidingDesc::Auto, .. } = &mut self.integrator
+        if let IntegratorDesc::Path { guiding: guiding @ AutoDesc::Auto, .. } = &mut self.integrator
             && shard != Shard::WHOLE
         {
-            *guiding = GuidingDesc::Off;
+            *guiding = AutoDesc::Off;
         }
         self
     }
@@ -164,12 +174,13 @@ impl Settings {
 
     /// Whether a pilot decides where there are enough samples.
     fn allows_guiding_pilot(&self) -> bool {
-        let IntegratorDesc::Path { guiding: GuidingDesc::Auto, strategy, max_depth, .. } = self.integrator else {
+        let IntegratorDesc::Path { guiding: AutoDesc::Auto, strategy, max_depth, .. } = self.integrator else {
             return false;
         };
         self.guide.is_none()
             && self.target_error.is_none()
-            && !self.has_epochs()
+            && !self.gathers_photons()
+            && self.bidirectional() != Some(true)
             && strategy == StrategyDesc::Mis
             && max_depth >= LEAST_GUIDED_DEPTH
     }
@@ -283,55 +294,10 @@ fn time_limit(overrides: &Overrides) -> Result<Option<Duration>> {
     limit.map(Some).ok_or_else(|| refused("time_limit", format!(" {seconds}: a number of seconds above 0")))
 }
 
-fn outputs(desc: &SceneDesc, overrides: &Overrides, integrator: &IntegratorDesc) -> Result<Vec<OutputDesc>> {
-    let by_name = |names: &[String]| -> Vec<OutputDesc> { names.iter().map(OutputDesc::new).collect() };
-    let mut outputs = if !overrides.outputs.is_empty() {
-        by_name(&overrides.outputs)
-    } else if !desc.outputs.is_empty() {
-        desc.outputs.clone()
-    } else {
-        by_name(&overrides.default_outputs)
-    };
-    let has_extension = |output: &OutputDesc, extension: &str| output.file.to_ascii_lowercase().ends_with(extension);
-    let needs = |setting: &'static str, given: bool, extension: &str| {
-        if given && !outputs.iter().any(|output| has_extension(output, extension)) {
-            return Err(refused(setting, format!(" has no effect: no output is an {extension} file")));
-        }
-        Ok(())
-    };
-    needs("layers", !overrides.layers.is_empty(), ".exr")?;
-    needs("float", overrides.float.is_some(), ".exr")?;
-    // The frame rate of a sequence is there in any case.
-    let exr = ExrOverrides { frames_per_second: None, ..overrides.exr.clone() };
-    needs("exr", exr != ExrOverrides::default(), ".exr")?;
-    needs("exposure", overrides.exposure.is_some(), ".png")?;
-    needs("view", overrides.view.is_some(), ".png")?;
-    if overrides.exposure.is_some_and(|stops| !stops.is_finite()) {
-        return Err(refused("exposure", ": a finite number of stops"));
-    }
-    for output in &mut outputs {
-        if has_extension(output, ".exr") {
-            if !overrides.layers.is_empty() {
-                output.layers.clone_from(&overrides.layers);
-            }
-            if let Some(float) = overrides.float {
-                output.pixel_type = if float { PixelTypeDesc::Float } else { PixelTypeDesc::Half };
-            }
-            overrides.exr.apply(output);
-            check_output(output)?;
-        }
-        if has_extension(output, ".png") {
-            output.exposure = overrides.exposure.unwrap_or(output.exposure);
-            output.view = overrides.view.or(output.view).or(Some(integrator.view()));
-        }
-    }
-    Ok(outputs)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::desc::SamplerKindDesc;
+    use crate::desc::{PixelTypeDesc, SamplerKindDesc};
 
     fn scene(text: &str) -> SceneDesc {
         serde_json::from_str(text).unwrap()
@@ -408,11 +374,11 @@ mod tests {
             clamp: Some(2.5),
             regularize: None,
             hide_emitters: false,
-            guiding: GuidingDesc::default(),
+            guiding: AutoDesc::default(),
             roulette: None,
             light_samples: None,
             caustics: CausticsDesc::Paths,
-            bidirectional: false,
+            bidirectional: AutoDesc::default(),
         };
         assert_eq!(s.integrator, changed);
         assert_eq!(s.time_limit, Some(Duration::from_millis(1500)));

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::sync::Mutex;
 
+use super::bidirectional_pilot;
 use super::caustic_pass::CausticPass;
 use super::light_path_pass::LightPathPass;
 use super::pixel_order::{pixel_of_slot, slots};
@@ -11,7 +12,7 @@ use super::{FINEST_SPP, Settings, TILE_SIZE, film_shape};
 use crate::accel::Accelerator;
 use crate::desc::{IntegratorDesc, RouletteDesc};
 use crate::film::{
-    FilmGrid, FilmTile, Filter, FilterSample, Filtering, LayerKind, LightAovRequest, Splats, WorldSample,
+    Crop, FilmGrid, FilmTile, Filter, FilterSample, Filtering, LayerKind, LightAovRequest, Splats, WorldSample,
 };
 use crate::guiding::Guide;
 use crate::integrator::{
@@ -40,7 +41,8 @@ pub(super) struct TileRenderer<'a> {
     guide: Option<Guide>,
     /// What traces and keeps photons, if paths gather them.
     caustics: Option<CausticPass>,
-    light_paths: Option<LightPathPass>,
+    /// What traces and keeps light paths, if paths are connected to them or may be.
+    pub light_paths: Option<LightPathPass>,
     /// What Russian roulette goes by, if it is to and the pilot was traced.
     roulette: Option<RouletteEstimates>,
     /// Lights that are sampled at the first vertex of a path; `None` for as many as the pilot finds best.
@@ -126,7 +128,7 @@ impl<'a> TileRenderer<'a> {
             filter,
             view: settings.size,
             caustics: settings.gathers_photons().then(|| CausticPass::new(scene, accel, settings)).flatten(),
-            light_paths: settings.is_bidirectional().then(|| LightPathPass::new(scene, settings)).flatten(),
+            light_paths: LightPathPass::new(scene, settings),
             guide: settings.guide.as_ref().and_then(|guide| guide.of_scene(accel.bounds())),
             roulette: None,
             light_samples: match settings.integrator {
@@ -152,11 +154,28 @@ impl<'a> TileRenderer<'a> {
         }
     }
 
-    /// Traces the pilot of the picture, if roulette needs one.
-    pub fn prepare(&mut self, workspaces: &[Mutex<TileWorkspace>]) {
+    /// Traces the pilots of the picture, as far as they are needed: that of roulette, and that of bidirectional path
+    /// tracing unless what it found is known.
+    pub fn prepare(&mut self, workspaces: &[Mutex<TileWorkspace>], is_bidirectional: Option<bool>) {
         if self.needs_pilot {
             self.roulette = RouletteEstimates::new(self, workspaces, self.light_samples);
         }
+        if let Some(light_paths) = self.light_paths.take_if(|light_paths| light_paths.needs_pilot)
+            && is_bidirectional.unwrap_or_else(|| bidirectional_pilot::pays(self, &light_paths, workspaces))
+        {
+            self.light_paths = Some(light_paths);
+        }
+    }
+
+    /// Whether paths are connected to light paths.
+    pub fn is_bidirectional(&self) -> bool {
+        self.light_paths.is_some()
+    }
+
+    /// The pixels of all that the camera shows, on the film's grid.
+    pub fn whole_view(&self) -> Crop {
+        let ([width, height], first) = (self.view, self.grid.offset + self.overscan);
+        Crop { x: first, y: first, width, height }
     }
 
     /// Traces samples of any seeds through points of the film, at most as many as a tile has pixels.

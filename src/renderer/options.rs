@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::{Assignment, DenoiseOptions, Renderer, StateOptions, StopHandle};
 use crate::accel::AccelKind;
-use crate::desc::{GuidingDesc, IntegratorDesc, LayerKind, RouletteDesc};
+use crate::desc::{AutoDesc, IntegratorDesc, LayerKind, RouletteDesc};
 use crate::error::{Error, Result};
 use crate::film::LayerSet;
 use crate::render::{Overrides, Progress, RenderProvenance, Settings, TrainedGuide, refused};
@@ -88,8 +88,15 @@ impl Renderer {
 
     /// Whether paths are guided by what earlier ones found; a `bool` is on or off.
     #[must_use]
-    pub fn guiding(mut self, guiding: impl Into<GuidingDesc>) -> Self {
+    pub fn guiding(mut self, guiding: impl Into<AutoDesc>) -> Self {
         self.overrides.guiding = Some(guiding.into());
+        self
+    }
+
+    /// Whether paths are connected to paths from the lights; a `bool` is on or off.
+    #[must_use]
+    pub fn bidirectional(mut self, bidirectional: impl Into<AutoDesc>) -> Self {
+        self.overrides.bidirectional = Some(bidirectional.into());
         self
     }
 

@@ -7,7 +7,7 @@ use crate::sampling::AliasTable;
 use crate::scene::Scene;
 
 /// Lights that light paths start from, chosen by power: emissive surfaces without textures.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Emitters {
     table: AliasTable,
 }

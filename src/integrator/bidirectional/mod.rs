@@ -49,6 +49,8 @@ pub struct LightVertex {
     pub segments: u32,
     /// What other strategies weigh.
     pub mis: PartialMis,
+    /// The part of it that is not of connections: lights that are sampled, or met by chance.
+    pub unconnected: PartialMis,
 }
 
 /// How light is scattered at a vertex.
@@ -89,6 +91,8 @@ pub struct LightPaths<'a> {
     pub vertices: &'a [LightVertex],
     /// The number of paths.
     pub traced: u32,
+    /// Whether [`Workspace::excess_moments`](super::Workspace::excess_moments) are wanted.
+    pub has_moments: bool,
 }
 
 /// A sum of squared densities of other strategies, for a weight of `1 / (1 + sum)`: finite, and 0 where it is not a

@@ -4,6 +4,7 @@ use super::Context;
 use super::block::{EvalRows, VertexRows, Vertices, spawn};
 use super::evals::Surfaces;
 use super::wave::Wave;
+use crate::color::Rgb;
 use crate::id::LightId;
 use crate::integrator::bidirectional::{CONNECTIONS_PER_VERTEX, LightPaths, PartialMis, bounded, squared};
 use crate::integrator::vertex::HemisphereTest;
@@ -41,6 +42,9 @@ soa! {
         d_vc: f64,
         light_d_vcm: f64,
         light_d_vc: f64,
+        /// The part of the last two that is not of connections.
+        unconnected_d_vcm: f64,
+        unconnected_d_vc: f64,
         /// Of the path that goes on.
         next_d_vc: f64,
     }
@@ -55,6 +59,10 @@ soa! {
         reversed: f32,
         /// Of rays from the sampled light, over their cosine.
         emitted: f32,
+        /// The weight of a connection by MIS.
+        weight: f32,
+        /// The mean of the square that a path without connections adds, over that which a connection adds.
+        moment_ratio: f32,
         /// Whether the path that goes on has a vertex that can be connected.
         is_connectable: u32,
     }
@@ -72,6 +80,44 @@ impl ConnectionMis {
     pub fn after(&self, lane: usize) -> ConnectionState {
         let is_connectable = self.densities.is_connectable[lane] != 0;
         ConnectionState { d_vc: self.mis.next_d_vc[lane], is_connectable }
+    }
+}
+
+/// The second moments that samples would have without connections, beyond those that they have.
+#[derive(Default)]
+pub(super) struct ConnectionMoments {
+    /// By sample, and channel; empty where they are not wanted.
+    excess: Vec<[f64; 3]>,
+    /// By shadow ray, as [`DensityRows::moment_ratio`].
+    pub ratios: Vec<f32>,
+}
+
+impl ConnectionMoments {
+    pub fn start(&mut self, light_paths: Option<&LightPaths>, samples: usize) {
+        self.excess.clear();
+        if light_paths.is_some_and(|light_paths| light_paths.has_moments) {
+            self.excess.resize(samples, [0.0; 3]);
+        }
+    }
+
+    pub fn is_wanted(&self) -> bool {
+        !self.excess.is_empty()
+    }
+
+    /// By sample, and channel.
+    pub fn excess(&self) -> &[[f64; 3]] {
+        &self.excess
+    }
+
+    /// Adds the light of a shadow ray that nothing blocks.
+    #[inline]
+    pub fn add(&mut self, ray: usize, slot: u32, light: Rgb) {
+        if let Some(excess) = self.excess.get_mut(slot as usize) {
+            let ratio = f64::from(self.ratios[ray]) - 1.0;
+            for (excess, value) in excess.iter_mut().zip(light.to_array()) {
+                *excess += f64::from(value) * f64::from(value) * ratio;
+            }
+        }
     }
 }
 

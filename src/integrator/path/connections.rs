@@ -4,7 +4,7 @@ use std::f32::consts::FRAC_1_PI;
 
 use super::Context;
 use super::block::{DirectRows, EvalRows, PointRows, VertexRows, Vertices, spawn, vertex_flags};
-use super::connection_mis::{ConnectionMis, MisRows};
+use super::connection_mis::{ConnectionMis, DensityRows, MisRows};
 use super::direct::{self, shadowing};
 use super::evals::Surfaces;
 use super::wave::Wave;
@@ -16,7 +16,7 @@ use crate::integrator::vertex::HemisphereTest;
 use crate::light::LightSampleRows;
 use crate::math::Vec3;
 use crate::math::prefetch::prefetch;
-use crate::math::rows::{BATCH, Row, soa};
+use crate::math::rows::{BATCH, soa};
 use crate::math::vectorize::vectorize;
 
 soa! {
@@ -69,9 +69,12 @@ pub(super) fn sample(context: &Context, wave: &mut Wave, block: usize) {
     let per_path = light_paths.vertices.len() as f32 / light_paths.traced as f32;
     let pairs = Pairs { rows, points, lights: light_samples, evals: light_evals, ends, mis, per_path };
     if context.scene.features.normal_perturbations {
-        vectorize!(connect::<true>(&pairs, &densities.reversed, direct, *count));
+        vectorize!(connect::<true>(&pairs, densities, direct, *count));
     } else {
-        vectorize!(connect::<false>(&pairs, &densities.reversed, direct, *count));
+        vectorize!(connect::<false>(&pairs, densities, direct, *count));
+    }
+    if light_paths.has_moments {
+        vectorize!(find_moments(&pairs, densities, direct, *count));
     }
     light_samples.light = ends.light;
     if context.config.clamp.is_finite() {
@@ -83,6 +86,9 @@ pub(super) fn sample(context: &Context, wave: &mut Wave, block: usize) {
     }
     if let Some(grid) = context.pass.continuations {
         direct::roulette(grid, vertices);
+    }
+    if light_paths.has_moments {
+        vectorize!(divide_moments(densities, &vertices.direct, vertices.count));
     }
     // Once or more: the classes of light are the same.
     wave.queue_shadow_rays(context, block, 1);
@@ -113,6 +119,9 @@ fn choose<'a>(context: &Context, wave: &mut Wave, all: &'a [LightVertex]) -> [Op
         let is_chosen = is_short && vertices.rows.flags[lane] & vertex_flags::UNSAMPLED == 0;
         ends.is_chosen[lane] = u32::from(is_chosen);
         *scattering = vertex.scattering.as_deref().filter(|_| is_chosen);
+        if let Some(scattering) = scattering {
+            prefetch(std::slice::from_ref(*scattering), 0);
+        }
         vertices.points.target_p.set(lane, vertex.point.p);
         ends.n.set(lane, vertex.point.n);
         ends.error[lane] = vertex.point.error;
@@ -122,6 +131,7 @@ fn choose<'a>(context: &Context, wave: &mut Wave, all: &'a [LightVertex]) -> [Op
         ends.flux.set(lane, vertex.flux);
         (ends.light[lane], ends.segments[lane]) = (vertex.light.0, vertex.segments);
         (mis.light_d_vcm[lane], mis.light_d_vc[lane]) = (vertex.mis.d_vcm, vertex.mis.d_vc);
+        (mis.unconnected_d_vcm[lane], mis.unconnected_d_vc[lane]) = (vertex.unconnected.d_vcm, vertex.unconnected.d_vc);
     }
     scatterings
 }
@@ -172,7 +182,7 @@ struct Pairs<'a> {
 /// Finds the light that reaches the camera if nothing is between the vertices, weighted by MIS, and the rays between
 /// them.
 #[inline(always)]
-fn connect<const PERTURBED: bool>(pairs: &Pairs, reversed: &Row, direct: &mut DirectRows, count: usize) {
+fn connect<const PERTURBED: bool>(pairs: &Pairs, densities: &mut DensityRows, direct: &mut DirectRows, count: usize) {
     let Pairs { rows, points, lights, evals, ends, mis, per_path } = *pairs;
     for i in 0..count.min(BATCH) {
         let direction = lights.direction.get(i);
@@ -191,8 +201,9 @@ fn connect<const PERTURBED: bool>(pairs: &Pairs, reversed: &Row, direct: &mut Di
         let of_light = PartialMis { d_vcm: mis.light_d_vcm[i], d_vc: mis.light_d_vc[i] };
         let of_camera = PartialMis { d_vcm: mis.d_vcm[i], d_vc: mis.d_vc[i] };
         let by_camera = squared(evals.pdf[i] * cos_light / distance_squared) * of_light.sum(ends.pdf_to_light[i]);
-        let by_light = squared(ends.pdf_to_vertex[i] * cos / distance_squared) * of_camera.sum(reversed[i]);
+        let by_light = squared(ends.pdf_to_vertex[i] * cos / distance_squared) * of_camera.sum(densities.reversed[i]);
         let weight = (1.0 / (1.0 + bounded(by_camera + by_light))) as f32;
+        densities.weight[i] = weight;
         let contribution = light * (weight * per_path);
         direct.contribution.set(i, contribution);
         let is_lit = (ends.is_chosen[i] != 0) & !contribution.is_black() & contribution.is_finite();
@@ -204,5 +215,30 @@ fn connect<const PERTURBED: bool>(pairs: &Pairs, reversed: &Row, direct: &mut Di
         direct.shadow_origin.set(i, ray.origin);
         direct.shadow_direction.set(i, ray.direction);
         direct.shadow_end[i] = ray.t_max;
+    }
+}
+
+/// Finds how the squares of what connections add would grow without connections, over the squares of these: a path that
+/// lights and chance find with a density `r` times less adds `r` times more, where it is found.
+#[inline(always)]
+fn find_moments(pairs: &Pairs, densities: &mut DensityRows, direct: &DirectRows, count: usize) {
+    let Pairs { evals, ends, mis, lights, .. } = *pairs;
+    for i in 0..count.min(BATCH) {
+        let cos_light = lights.direction.get(i).dot(ends.n.get(i));
+        let unconnected = PartialMis { d_vcm: mis.unconnected_d_vcm[i], d_vc: mis.unconnected_d_vc[i] };
+        let density =
+            squared(evals.pdf[i] * cos_light / ends.distance_squared[i]) * unconnected.sum(ends.pdf_to_light[i]);
+        let ratio = (1.0 / (density.sqrt() * f64::from(densities.weight[i]))) as f32;
+        // Times the light before roulette, which is divided by that after it.
+        densities.moment_ratio[i] =
+            if ratio < f32::INFINITY { ratio } else { 1.0 } * direct.contribution.get(i).max_channel();
+    }
+}
+
+/// Takes what roulette has multiplied squares by out of their ratios.
+#[inline(always)]
+fn divide_moments(densities: &mut DensityRows, direct: &DirectRows, count: usize) {
+    for i in 0..count.min(BATCH) {
+        densities.moment_ratio[i] /= direct.contribution.get(i).max_channel();
     }
 }

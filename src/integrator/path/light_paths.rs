@@ -25,8 +25,9 @@ pub(super) struct LightPathState {
     start: SpawnPoint,
     /// Density per area and solid angle of its first segment, over the cosine with the light's normal.
     pdf_per_cos: f32,
-    /// As of the last vertex.
+    /// As of the last vertex: [`PartialMis::d_vc`], and the part of it that is not of connections.
     d_vc: f64,
+    unconnected_d_vc: f64,
 }
 
 /// Appends the vertices of light paths.
@@ -90,7 +91,7 @@ fn start(context: &Context, source: &Source, wave: &mut Wave) {
             continue;
         }
         samples.push(&CameraSample { ray: point.ray_along(direction), seed, sample: index });
-        states.push(LightPathState { light, start: point, pdf_per_cos, d_vc: 0.0 });
+        states.push(LightPathState { light, start: point, pdf_per_cos, d_vc: 0.0, unconnected_d_vc: 0.0 });
         fluxes.push(flux);
     }
     wave.start(context, &samples);
@@ -111,16 +112,16 @@ fn advance(context: &Context, wave: &mut Wave, block: usize, light_vertices: &mu
         }
         let path = vertices.path(lane);
         let state = &mut light_paths[block * BATCH + path];
-        let mis = arrived(context, vertices, lane, &paths[block], state);
+        let arrived = arrived(context, vertices, lane, &paths[block], state);
         if vertices.rows.flags[lane] & vertex_flags::DELTA == 0 {
-            light_vertices.push(light_vertex(context, vertices, lane, mis, state.light));
+            light_vertices.push(light_vertex(context, vertices, lane, arrived, state.light));
         }
-        scatter_light(context, vertices, lane, mis, state);
+        scatter_light(context, vertices, lane, arrived, state);
     }
 }
 
 /// What is stored of a vertex of a light path.
-fn light_vertex(context: &Context, vertices: &Vertices, lane: usize, mis: PartialMis, light: LightId) -> LightVertex {
+fn light_vertex(context: &Context, vertices: &Vertices, lane: usize, arrived: Arrived, light: LightId) -> LightVertex {
     let rows = &vertices.rows;
     let (flux, frame, wi) = (rows.throughput.get(lane), vertices.frame(lane), rows.wo.get(lane));
     let bsdf = vertices.bsdfs.get(context.scene, lane);
@@ -134,30 +135,34 @@ fn light_vertex(context: &Context, vertices: &Vertices, lane: usize, mis: Partia
         scattering: bsdf.map(|bsdf| Box::new(Scattering { frame, wi, bsdf: bsdf.clone() })),
         light,
         segments: context.bounce + 1,
-        mis,
+        mis: arrived.mis,
+        unconnected: arrived.unconnected,
     }
 }
 
+/// The sums of other strategies where a light path arrives, and of those without connections.
+#[derive(Clone, Copy)]
+struct Arrived {
+    mis: PartialMis,
+    unconnected: PartialMis,
+}
+
 /// The sums of other strategies where a light path arrives.
-fn arrived(
-    context: &Context,
-    vertices: &Vertices,
-    lane: usize,
-    paths: &PathRows,
-    state: &LightPathState,
-) -> PartialMis {
+fn arrived(context: &Context, vertices: &Vertices, lane: usize, paths: &PathRows, state: &LightPathState) -> Arrived {
     let Vertices { rows, .. } = vertices;
     let path = vertices.path(lane);
     let cos = squared(rows.cos_geometric[lane]);
     if context.bounce > 0 {
         let d_vcm =
             if paths.is_specular(path) { 0.0 } else { squared(rows.t[lane] * rows.t[lane] / paths.pdf[path]) / cos };
-        return PartialMis { d_vcm, d_vc: state.d_vc / cos };
+        let unconnected = PartialMis { d_vcm: 0.0, d_vc: state.unconnected_d_vc / cos };
+        return Arrived { mis: PartialMis { d_vcm, d_vc: state.d_vc / cos }, unconnected };
     }
     // The first vertex samples the light, or meets it by chance.
     let sampled = light_pdf(context, vertices, lane, state);
     let start = squared(state.pdf_per_cos) * cos * CONNECTIONS_PER_VERTEX * CONNECTIONS_PER_VERTEX;
-    PartialMis { d_vcm: squared(sampled) / start, d_vc: 1.0 / start }
+    let mis = PartialMis { d_vcm: squared(sampled) / start, d_vc: 1.0 / start };
+    Arrived { mis, unconnected: mis }
 }
 
 /// The density per solid angle with which a path from the camera samples the light from the vertex.
@@ -186,25 +191,35 @@ fn light_pdf(context: &Context, vertices: &Vertices, lane: usize, state: &LightP
 }
 
 /// Scatters a light path: its flux, roulette by what scattering leaves of it, and the sums of other strategies.
-fn scatter_light(context: &Context, vertices: &mut Vertices, lane: usize, mis: PartialMis, state: &mut LightPathState) {
+fn scatter_light(
+    context: &Context,
+    vertices: &mut Vertices,
+    lane: usize,
+    arrived: Arrived,
+    state: &mut LightPathState,
+) {
     let (rows, scatter) = (&vertices.rows, &vertices.scatter);
     let (wi, out) = (rows.wo.get(lane), scatter.wi.get(lane));
     let cos_out = scatter.direction.get(lane).dot(rows.n_g.get(lane));
     let flux = rows.throughput.get(lane);
     let is_delta = scatter.is_delta[lane] != 0;
-    let (next, d_vc) = if is_delta {
+    let Arrived { mis, unconnected } = arrived;
+    let (next, [d_vc, unconnected_d_vc]) = if is_delta {
         let ratio = super::caustics::shading_ratio(vertices, lane);
-        (flux * scatter.weight.get(lane) * (scatter.rr_factor[lane] * ratio), mis.d_vc * squared(cos_out))
+        (
+            flux * scatter.weight.get(lane) * (scatter.rr_factor[lane] * ratio),
+            [mis, unconnected].map(|mis| mis.d_vc * squared(cos_out)),
+        )
     } else {
         let pdf = scatter.pdf[lane];
         let toward = vertices.reversed_eval(context.scene, lane, out);
         let test = HemisphereTest::new([wi.z, out.z], [rows.cos_geometric[lane], cos_out]);
         let factor = shadowing::<true>(test, [rows.cos_geometric[lane], wi.z, rows.cos_normals[lane]]);
         let weight = (cos_out / (rows.cos_geometric[lane] * pdf)).abs() * factor;
-        let d_vc = squared(cos_out / pdf) * mis.sum(toward.pdf);
+        let d_vc = [mis, unconnected].map(|mis| squared(cos_out / pdf) * mis.sum(toward.pdf));
         (flux * toward.value * weight, d_vc)
     };
-    state.d_vc = d_vc;
+    (state.d_vc, state.unconnected_d_vc) = (d_vc, unconnected_d_vc);
     let survival = (next.max_channel() / flux.max_channel()).min(1.0);
     let goes_on = scatter.status[lane] == spawn::SPAWNED && vertices.u_bsdf.of(lane)[3] < survival && next.is_finite();
     let scatter = &mut vertices.scatter;

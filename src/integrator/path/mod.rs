@@ -126,6 +126,11 @@ impl PathBuffers {
     pub fn second_moments(&self, out: &SampleBatch) -> Vec<SecondMoments> {
         self.0.guided.second_moments(out)
     }
+
+    /// As [`Workspace::excess_moments`].
+    pub fn excess_moments(&self) -> &[[f64; 3]] {
+        self.0.moments.excess()
+    }
 }
 
 impl Integrator for PathIntegrator {

@@ -34,7 +34,7 @@ pub(super) fn shadow(context: &Context, wave: &mut Wave, out: &mut Output, count
     if !context.scene.features.participating_media {
         counts.shadow += shadows.count as u64;
     }
-    let toward_one_place = context.bounce == 0 && !context.scene.features.environment;
+    let toward_one_place = context.bounce == 0 && !context.scene.features.environment && wave.connections.is_empty();
     let coherence = if toward_one_place { Coherence::Coherent } else { Coherence::Incoherent };
     let mut occluded = [false; BATCH];
     for (block, rays) in shadows.rays.iter().enumerate().take(shadows.count.div_ceil(BATCH)) {
@@ -50,6 +50,7 @@ pub(super) fn shadow(context: &Context, wave: &mut Wave, out: &mut Output, count
             let rows = &shadows.rows[block];
             let (slot, light) = (rows.slot[i % BATCH], rows.contribution.get(i % BATCH));
             out.add(slot, light);
+            wave.moments.add(i, slot, light);
             if context.bounce == 0 {
                 wave.continuations.add_direct(i, slot, light);
             }
@@ -59,5 +60,6 @@ pub(super) fn shadow(context: &Context, wave: &mut Wave, out: &mut Output, count
         }
     }
     shadows.count = 0;
+    wave.moments.ratios.clear();
     wave.light_aovs.shadow_sources.clear();
 }

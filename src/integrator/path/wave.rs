@@ -2,7 +2,7 @@
 
 use super::block::{Vertices, spawn};
 use super::caustics::CausticState;
-use super::connection_mis::{ConnectionMis, ConnectionState};
+use super::connection_mis::{ConnectionMis, ConnectionMoments, ConnectionState};
 use super::connections::LightVertexRows;
 use super::continuations::ContinuationRecorder;
 use super::guided::GuideRecorder;
@@ -147,6 +147,7 @@ pub(super) struct Wave {
     pub connections: Vec<ConnectionState>,
     pub connection_mis: ConnectionMis,
     pub connection_ends: LightVertexRows,
+    pub moments: ConnectionMoments,
     /// By light path, where the wave is one of light paths.
     pub light_paths: Vec<LightPathState>,
     pub light_aovs: LightAovs,
@@ -197,6 +198,7 @@ impl Wave {
         if context.pass.light_paths.is_some() {
             self.connections.resize(samples.len(), ConnectionState::default());
         }
+        self.moments.start(context.pass.light_paths, samples.len());
         self.light_aovs.start(context.config, samples.len());
         self.guided.clear();
         self.shadows.count = 0;
@@ -298,6 +300,10 @@ impl Wave {
                 let event = self.light_aovs.shadow_event(context, path, scatterings, lobes);
                 self.light_aovs.shadow_sources.push((event, LightId(self.vertices.light_samples.light[lane])));
             }
+        }
+        if self.moments.is_wanted() {
+            let ratio = |lane| if scatterings > 0 { self.connection_mis.densities.moment_ratio[lane] } else { 1.0 };
+            self.moments.ratios.extend((0..BATCH).filter(|&lane| lanes.contains(lane)).map(ratio));
         }
         let shadows = &mut self.shadows;
         let (to, at) = (shadows.count / BATCH, shadows.count % BATCH);

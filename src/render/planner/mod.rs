@@ -17,7 +17,7 @@ use std::ops::Range;
 use std::sync::Mutex;
 use std::time::Duration;
 
-use super::guiding_pilot::GuidingPilot;
+use super::guiding_pilot::{GuidingPilot, may_pay};
 use super::tile_renderer::{TileRenderer, TileWorkspace};
 use super::{GuidingStage, RenderSession, RenderState, Settings, Shard};
 use crate::error::Result;
@@ -144,8 +144,10 @@ impl RenderState {
             }
             Planner::Guided(planner) => planner.samples_with_this_guide(self.done),
             Planner::Pilot(_) => PilotPlanner::samples_with_this_guide(self.done),
-            // Of one epoch of photons.
-            Planner::Uniform if session.settings.has_epochs() => EPOCH - missing.start % EPOCH,
+            // Of one epoch of photons or light paths.
+            Planner::Uniform if session.settings.gathers_photons() || self.bidirectional == Some(true) => {
+                EPOCH - missing.start % EPOCH
+            }
             Planner::Uniform => u32::MAX,
         };
         let tiles = self.tiles_in_partial_pass..(self.tiles_in_partial_pass + size.tiles).min(all);
@@ -226,9 +228,9 @@ impl RenderState {
         if renderer.context.is_cancelled() {
             return RayCounts::default();
         }
-        let gain = guided.gain();
+        let gain = guided.gain(0.0);
         tracing::info!("pilot of guiding: {gain:?}");
-        let is_likely = gain.is_some_and(|gain| gain.may_pay());
+        let is_likely = gain.is_some_and(may_pay);
         // Without memory for the samples of an iteration the picture is not guided.
         let next = if is_likely { GuidedPlanner::trained(&self.film, planner.take_guide(), self.done) } else { None };
         self.planner = next.map_or(Planner::Uniform, |planner| Planner::Guided(Box::new(planner)));

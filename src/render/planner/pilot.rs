@@ -7,7 +7,7 @@ use super::training_schedule::next_refinement;
 use crate::bytes::{ByteReader, ByteWriter};
 use crate::guiding::Guide;
 use crate::math::Aabb;
-use crate::render::guiding_pilot::PilotSamples;
+use crate::render::pilot_samples::PilotSamples;
 
 /// Samples per pixel before the decision.
 pub(super) const LEARNED: u32 = 4;

@@ -106,6 +106,9 @@ pub struct Header {
     pub tiles_in_partial_pass: u64,
     /// Whether no sample is missing.
     pub complete: bool,
+    /// Whether paths are connected to light paths, once that is decided.
+    #[serde(default)]
+    pub bidirectional: Option<bool>,
     /// Whether paths are guided from here on.
     #[serde(default)]
     pub guiding: GuidingStage,

@@ -52,6 +52,8 @@ pub struct RenderState {
     pub torn: bool,
     /// Whether no sample is missing.
     pub complete: bool,
+    /// Whether paths are connected to light paths; `None` before that is decided.
+    pub(super) bidirectional: Option<bool>,
     /// What decides on the samples that are missing.
     pub(super) planner: Planner,
     /// Rays so far.
@@ -81,6 +83,7 @@ impl RenderState {
             tiles_in_partial_pass: 0,
             torn: false,
             complete: false,
+            bidirectional: None,
             planner,
             rays,
             seconds: 0.0,
@@ -116,6 +119,7 @@ impl RenderState {
     /// Replaces a state of the same shape and planner by that in a file.
     fn load(&mut self, reader: &mut Reader) -> Result<()> {
         (self.done, self.complete) = (reader.header().done, reader.header().complete);
+        self.bidirectional = reader.header().bidirectional;
         self.tiles_in_partial_pass = (reader.header().tiles_in_partial_pass as usize).min(self.film.tiles().len() - 1);
         self.rays = rays(reader.header().rays);
         self.seconds = reader.header().render_seconds;
@@ -154,6 +158,7 @@ impl RenderState {
             done: self.done,
             tiles_in_partial_pass: self.tiles_in_partial_pass as u64,
             complete: self.complete,
+            bidirectional: self.bidirectional,
             guiding: self.planner.guiding(),
             film: self.film.shape().clone(),
             rays: [camera, indirect, shadow],
@@ -177,6 +182,14 @@ impl RenderState {
     /// The picture so far.
     pub fn picture(&self, settings: &Settings) -> Image {
         super::picture(&self.whole_film(), settings.layers, settings.overscan)
+    }
+
+    /// Sets whether paths are connected to light paths, in which case nothing guides them.
+    pub(super) fn set_bidirectional(&mut self, is_bidirectional: bool) {
+        self.bidirectional = Some(is_bidirectional);
+        if is_bidirectional && matches!(self.planner, Planner::Pilot(_)) {
+            self.planner = Planner::Uniform;
+        }
     }
 
     /// The indices of the samples that every pixel is still to get.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use steradian::desc::{GuidingDesc, IntegratorDesc, SamplerKindDesc, StrategyDesc};
+use steradian::desc::{AutoDesc, IntegratorDesc, SamplerKindDesc, StrategyDesc};
 use steradian::internal::accel::AccelKind;
 use steradian_bench::error::Peer;
 
@@ -94,11 +94,11 @@ pub struct BenchErrorArgs {
     /// Path guiding: sample directions by the incident radiance learned from earlier paths
     #[
         arg(
-            long, value_name = "LIST", value_delimiter = ',', value_parser = names::plain::<GuidingDesc>(),
+            long, value_name = "LIST", value_delimiter = ',', value_parser = names::plain::<AutoDesc>(),
             help_heading = "Variants"
         )
     ]
-    pub guiding: Vec<GuidingDesc>,
+    pub guiding: Vec<AutoDesc>,
     /// Ray accelerator
     #[arg(long, value_name = "LIST", value_delimiter = ',', long_help = accel_help(), help_heading = "Variants")]
     pub accel: Vec<AccelKind>,

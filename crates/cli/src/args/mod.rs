@@ -24,9 +24,7 @@ use std::path::PathBuf;
 
 use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
-use steradian::desc::{
-    CausticsDesc, GuidingDesc, IntegratorDesc, RouletteDesc, SamplerKindDesc, StrategyDesc, ViewDesc,
-};
+use steradian::desc::{AutoDesc, CausticsDesc, IntegratorDesc, RouletteDesc, SamplerKindDesc, StrategyDesc, ViewDesc};
 use steradian::internal::accel::AccelKind;
 use steradian::internal::render::{ExrOverrides, Overrides};
 use steradian::{Assignment, ExrChanges};
@@ -288,9 +286,13 @@ pub struct RenderArgs {
     pub caustics: Option<CausticsDesc>,
     /// Bidirectional path tracing: connect paths to paths from the lights
     ///
-    /// Less noise of lamps that shine at walls and shades. Not with --caustics photons or what that excludes
-    #[arg(long, help_heading = "Algorithm")]
-    pub bidirectional: bool,
+    /// Less noise of lamps that shine at walls and shades. auto: if a pilot shows that this outweighs the cost; never
+    /// below 16 samples per pixel. Not with --caustics photons or what that excludes. Default: auto; without NAME: on
+    #[arg(
+        long, value_name = "NAME", num_args = 0..=1, default_missing_value = "on",
+        value_parser = names::plain::<AutoDesc>(), help_heading = "Algorithm"
+    )]
+    pub bidirectional: Option<AutoDesc>,
     /// Path guiding: sample directions by the incident radiance learned from earlier paths
     ///
     /// For scenes whose light comes by few ways, such as through a door ajar. auto: if a pilot, and samples with and
@@ -300,13 +302,11 @@ pub struct RenderArgs {
     /// and --resume the picture is the same bit for bit. on is unsupported with --shard: each part would have to render
     /// nearly all samples to train the guide; --guide uses a trained one. Without NAME: on. Default: the scene's
     /// setting, or auto
-    #[
-        arg(
-            long, value_name = "NAME", num_args = 0..=1, default_missing_value = "on",
-            value_parser = names::plain::<GuidingDesc>(), help_heading = "Algorithm"
-        )
-    ]
-    pub guiding: Option<GuidingDesc>,
+    #[arg(
+        long, value_name = "NAME", num_args = 0..=1, default_missing_value = "on",
+        value_parser = names::plain::<AutoDesc>(), help_heading = "Algorithm"
+    )]
+    pub guiding: Option<AutoDesc>,
     /// As --guiding off
     #[arg(long, hide = true, overrides_with = "guiding")]
     pub no_guiding: bool,
@@ -473,8 +473,8 @@ impl RenderArgs {
             clamp: self.clamp,
             regularize: self.regularize,
             caustics: self.caustics,
-            bidirectional: self.bidirectional.then_some(true),
-            guiding: if self.no_guiding { Some(GuidingDesc::Off) } else { self.guiding },
+            bidirectional: self.bidirectional,
+            guiding: if self.no_guiding { Some(AutoDesc::Off) } else { self.guiding },
             guide: None,
             time_limit: self.time_limit,
             outputs: self.output.clone(),

@@ -2,7 +2,7 @@
 
 use super::*;
 use clap::CommandFactory;
-use steradian::desc::{CausticsDesc, ExrProfileDesc, GuidingDesc, LayerKind};
+use steradian::desc::{AutoDesc, CausticsDesc, ExrProfileDesc, LayerKind};
 
 fn render(arguments: &[&str]) -> Result<RenderArgs, clap::Error> {
     let line = ["steradian", "render", "a.json"].iter().chain(arguments);
@@ -47,8 +47,8 @@ fn every_option_reaches_the_overrides() {
         (vec!["a.exr".to_owned(), "b.png".to_owned()], vec!["d.exr".to_owned()])
     );
     assert_eq!((o.exr.profile, o.exr.owner), (Some(ExrProfileDesc::Nuke), Some("b".to_owned())));
-    assert_eq!(o.bidirectional, Some(true));
-    assert_eq!((o.caustics, o.guiding), (Some(CausticsDesc::Photons), Some(GuidingDesc::On)));
+    assert_eq!(o.bidirectional, Some(AutoDesc::On));
+    assert_eq!((o.caustics, o.guiding), (Some(CausticsDesc::Photons), Some(AutoDesc::On)));
     assert!(o.regularize == Some(0.2) && o.no_depth_of_field && o.transparent == Some(true));
     assert_eq!((arguments.verbosity.verbose, arguments.verbosity.quiet), (2, false));
     assert_eq!(render(&["--json", "a.json"]).unwrap().stats, Some("a.json".into()));
@@ -108,13 +108,13 @@ fn switches_have_opposites() {
     let guiding = |line: &str| overrides(line).unwrap().guiding;
     for (line, expected) in [
         ("", None),
-        ("--guiding", Some(GuidingDesc::On)),
-        ("--guiding --spp 3", Some(GuidingDesc::On)),
-        ("--guiding auto", Some(GuidingDesc::Auto)),
-        ("--guiding=off", Some(GuidingDesc::Off)),
-        ("--no-guiding", Some(GuidingDesc::Off)),
-        ("--guiding --no-guiding", Some(GuidingDesc::Off)),
-        ("--no-guiding --guiding auto", Some(GuidingDesc::Auto)),
+        ("--guiding", Some(AutoDesc::On)),
+        ("--guiding --spp 3", Some(AutoDesc::On)),
+        ("--guiding auto", Some(AutoDesc::Auto)),
+        ("--guiding=off", Some(AutoDesc::Off)),
+        ("--no-guiding", Some(AutoDesc::Off)),
+        ("--guiding --no-guiding", Some(AutoDesc::Off)),
+        ("--no-guiding --guiding auto", Some(AutoDesc::Auto)),
     ] {
         assert_eq!(guiding(line), expected, "{line}");
     }
