@@ -146,8 +146,8 @@ impl PilotSamples {
         mean(self.means.iter().map(|pixel| pixel.radiance))
     }
 
-    /// The variance of a sample without the method over that with it; `None` if the samples are black or all alike. This
-    /// part of the pixels, those where it differs most, is left out.
+    /// The variance of a sample without the method over that with it; `None` if the samples are black or all alike. A
+    /// part of the pixels, those where that differs most, is left out.
     pub fn gain(&self, left_out: f64) -> Option<Estimate> {
         let factors = self.pixels.relative_to(|i| self.means[i].radiance);
         let count = f64::from(self.samples);

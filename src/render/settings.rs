@@ -378,7 +378,8 @@ mod tests {
             roulette: None,
             light_samples: None,
             caustics: CausticsDesc::Paths,
-            bidirectional: AutoDesc::default(),
+            // Unsupported with such a strategy.
+            bidirectional: AutoDesc::Off,
         };
         assert_eq!(s.integrator, changed);
         assert_eq!(s.time_limit, Some(Duration::from_millis(1500)));
