@@ -139,6 +139,7 @@ impl Driver<'_> {
         }
         stats.estimated_error = state.estimated_error();
         stats.samples = state.samples();
+        stats.bidirectional = state.bidirectional == Some(true);
         self.finish(state);
         stats
     }

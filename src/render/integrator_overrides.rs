@@ -108,7 +108,7 @@ fn set_caustics(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Resul
     if !matches!(integrator, IntegratorDesc::Path { caustics: CausticsDesc::Photons, .. }) {
         return Ok(());
     }
-    match unsupported_with_light_paths(integrator, overrides) {
+    match unsupported_with_epochs(integrator, overrides.guide.is_some(), overrides.target_error.is_some()) {
         Some(option) => Err(refused("caustics", format!(" photons: unsupported with {option}; give `caustics` paths"))),
         None => Ok(()),
     }
@@ -121,9 +121,8 @@ fn set_bidirectional(integrator: &mut IntegratorDesc, overrides: &Overrides) -> 
         };
         *bidirectional = chosen;
     }
-    let IntegratorDesc::Path { caustics, .. } = integrator else { return Ok(()) };
-    let photons = (*caustics == CausticsDesc::Photons).then_some("`caustics` photons");
-    let unsupported = photons.or_else(|| unsupported_with_light_paths(integrator, overrides));
+    let unsupported =
+        unsupported_with_light_paths(integrator, overrides.guide.is_some(), overrides.target_error.is_some());
     let IntegratorDesc::Path { bidirectional, .. } = integrator else { return Ok(()) };
     match unsupported {
         Some(option) if *bidirectional == AutoDesc::On => {
@@ -137,15 +136,27 @@ fn set_bidirectional(integrator: &mut IntegratorDesc, overrides: &Overrides) -> 
     }
 }
 
-/// The first option that is not supported with photons and light paths.
-fn unsupported_with_light_paths(integrator: &IntegratorDesc, overrides: &Overrides) -> Option<&'static str> {
+/// The first option that is unsupported with connections to light paths.
+pub(super) fn unsupported_with_light_paths(
+    integrator: &IntegratorDesc,
+    has_guide: bool,
+    has_target: bool,
+) -> Option<&'static str> {
+    match integrator {
+        IntegratorDesc::Path { caustics: CausticsDesc::Photons, .. } => Some("`caustics` photons"),
+        _ => unsupported_with_epochs(integrator, has_guide, has_target),
+    }
+}
+
+/// The first option that is unsupported with photons and with light paths.
+fn unsupported_with_epochs(integrator: &IntegratorDesc, has_guide: bool, has_target: bool) -> Option<&'static str> {
     let IntegratorDesc::Path { strategy, regularize, guiding, .. } = integrator else { return None };
     let options = [
         (*strategy != StrategyDesc::Mis, "`strategy` other than mis"),
         (regularize.is_some(), "`regularize`"),
         (*guiding == AutoDesc::On, "`guiding` on"),
-        (overrides.guide.is_some(), "`guide`"),
-        (overrides.target_error.is_some(), "`target_error`"),
+        (has_guide, "`guide`"),
+        (has_target, "`target_error`"),
     ];
     options.into_iter().find_map(|(is_given, option)| is_given.then_some(option))
 }

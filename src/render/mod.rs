@@ -77,6 +77,8 @@ pub struct Stats {
     pub nan_samples: u64,
     /// The first few of them.
     pub dropped: Vec<DroppedSample>,
+    /// Whether paths were connected to light paths.
+    pub bidirectional: bool,
     /// Whether a stop was requested before all samples were done.
     pub interrupted: bool,
     /// Whether the time limit ended the render.

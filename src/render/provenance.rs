@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::Settings;
+use super::integrator_overrides::unsupported_with_light_paths;
 use super::state::put;
+use super::{Settings, Stats};
 use crate::compile::check_film_and_integrator;
 use crate::desc::{FilmDesc, OutputDesc};
 use crate::error::{Error, Result};
@@ -50,6 +51,9 @@ pub struct RenderProvenance {
     pub frame: Option<SequenceFrame>,
     /// What the picture depends on beside the scene.
     pub settings: Settings,
+    /// Whether paths were connected to light paths, if a pilot has decided that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bidirectional: Option<bool>,
     /// Whether the picture was denoised, with the denoiser's own defaults.
     #[serde(default)]
     pub denoise: bool,
@@ -82,16 +86,20 @@ impl RenderProvenance {
             allow_missing: false,
             frame: None,
             settings: settings.clone(),
+            bidirectional: None,
             denoise: false,
             output: None,
         }
     }
 
-    /// The same with the samples that the picture has got in the end.
+    /// The same with the samples that the picture has got in the end, and with what a pilot has decided.
     #[must_use]
-    pub fn with_samples(mut self, spp: u32) -> Self {
+    pub fn of_render(mut self, stats: &Stats) -> Self {
+        if self.settings.bidirectional().is_none() {
+            self.bidirectional = Some(stats.bidirectional);
+        }
         if self.settings.target_error.is_none() {
-            self.settings.spp = spp;
+            self.settings.spp = stats.spp_done;
         }
         self
     }
@@ -186,6 +194,13 @@ impl RenderProvenance {
         )?;
         let guided = self.settings.is_guided() && target_error.is_some();
         require(!guided, "settings.target_error", "must be null with guiding")?;
+        let has_guide = self.settings.guide.is_some();
+        require(
+            (self.bidirectional != Some(true) && self.settings.bidirectional() == Some(false))
+                || unsupported_with_light_paths(integrator, has_guide, target_error.is_some()).is_none(),
+            "settings.integrator.bidirectional",
+            "must be off with what it does not support",
+        )?;
         require(self.import.time.is_finite(), "import.time", "must be finite")?;
         require(
             self.frame.is_none_or(|frame| i32::try_from(frame.number).is_ok()),
@@ -208,7 +223,11 @@ impl RenderProvenance {
     pub fn settings(&self, threads: usize) -> Settings {
         let layers = self.output.iter().flat_map(|output| &output.layers).collect();
         let outputs = self.output.iter().cloned().collect();
-        Settings { layers, outputs, threads, time_limit: None, ..self.settings.clone() }
+        let settings = Settings { layers, outputs, threads, time_limit: None, ..self.settings.clone() };
+        match self.bidirectional {
+            Some(is_bidirectional) => settings.with_bidirectional(is_bidirectional),
+            None => settings,
+        }
     }
 }
 
@@ -336,6 +355,22 @@ mod tests {
             changed.pointer_mut(object).unwrap()[key] = value;
             let refused = refusal(changed);
             assert!(refused.contains("a.exr") && refused.contains(message), "{place}: {refused}");
+        }
+    }
+
+    /// Whatever has ended the render, with too few samples for a pilot.
+    #[test]
+    fn what_a_pilot_has_decided_is_repeated() {
+        let mut recipe = RenderProvenance::from_value(provenance(), Path::new("a.exr")).unwrap();
+        recipe.settings.spp = 64;
+        for bidirectional in [true, false] {
+            let stats = Stats { spp_done: 3, bidirectional, ..Stats::default() };
+            let value = recipe.clone().of_render(&stats).to_value();
+            let settings = RenderProvenance::from_value(value.clone(), Path::new("a.exr")).unwrap().settings(1);
+            assert_eq!((settings.spp, settings.bidirectional()), (3, Some(bidirectional)));
+            let mut unsupported = value;
+            unsupported["settings"]["integrator"]["guiding"] = "on".into();
+            assert_eq!(RenderProvenance::from_value(unsupported, Path::new("a.exr")).is_err(), bidirectional);
         }
     }
 }

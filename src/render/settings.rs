@@ -149,6 +149,15 @@ impl Settings {
         }
     }
 
+    /// With or without connections to light paths, as far as the integrator has them.
+    #[must_use]
+    pub(crate) fn with_bidirectional(mut self, is_bidirectional: bool) -> Self {
+        if let IntegratorDesc::Path { bidirectional, .. } = &mut self.integrator {
+            *bidirectional = is_bidirectional.into();
+        }
+        self
+    }
+
     /// Whether paths train a guide in any case: a sample then depends on all that were before.
     pub fn is_guided(&self) -> bool {
         matches!(self.integrator, IntegratorDesc::Path { guiding: AutoDesc::On, .. })

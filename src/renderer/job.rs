@@ -80,7 +80,7 @@ impl Job {
                 rays: stats.rays.total(),
                 nan_samples: stats.nan_samples,
             }),
-            settings: self.recipe.clone().map(|recipe| recipe.with_samples(stats.spp_done).to_value()),
+            settings: self.recipe.clone().map(|recipe| recipe.of_render(&stats).to_value()),
             ..self.info(scene)
         };
         Ok(Rendering {
