@@ -1,7 +1,7 @@
 //! What comes before the world: film, filter, sampler, integrator.
 
 use super::params::Params;
-use crate::desc::{FilterDesc, IntegratorDesc, MAX_SIDE, OutputDesc, PixelTypeDesc};
+use crate::desc::{AutoDesc, FilterDesc, IntegratorDesc, MAX_SIDE, OutputDesc, PixelTypeDesc};
 use crate::error::Result;
 use crate::import::foreign::draft::SOBOL_FOR_INDEPENDENT;
 use crate::import::foreign::{Draft, Outcome};
@@ -148,7 +148,7 @@ pub fn set_sampler(draft: &mut Draft, sampler: Option<&Typed>) -> Result<()> {
 
 /// Sets the integrator: all that look for light are path tracing.
 pub fn set_integrator(draft: &mut Draft, integrator: Option<&Typed>) -> Result<()> {
-    let mut max_depth = 5;
+    let (mut max_depth, mut choice) = (5, AutoDesc::default());
     if let Some(Typed { kind, params }) = integrator {
         max_depth = params.integer_or("maxdepth", 5)?;
         if kind == "ambientocclusion" || kind == "ao" {
@@ -160,7 +160,12 @@ pub fn set_integrator(draft: &mut Draft, integrator: Option<&Typed>) -> Result<(
         }
         match kind.as_str() {
             "path" | "volpath" | "simplevolpath" => {}
-            "bdpt" | "mlt" | "sppm" | "simplepath" | "lightpath" | "randomwalk" => {
+            "bdpt" => {
+                choice = AutoDesc::On;
+                let note = "bidirectional path tracing without connections to the camera";
+                draft.note(&params.place, &params.element, "", Outcome::Mapped, note.into());
+            }
+            "mlt" | "sppm" | "simplepath" | "lightpath" | "randomwalk" => {
                 draft.approximated(
                     &params.place,
                     &params.element,
@@ -184,5 +189,8 @@ pub fn set_integrator(draft: &mut Draft, integrator: Option<&Typed>) -> Result<(
     // pbrt counts bounces, we count segments: one bounce is the light that arrives over two.
     let max_depth = u32::try_from(max_depth.max(0)).unwrap_or(u32::MAX).saturating_add(1);
     draft.desc.integrator = IntegratorDesc::path(max_depth, None);
+    if let IntegratorDesc::Path { bidirectional, .. } = &mut draft.desc.integrator {
+        *bidirectional = choice;
+    }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! Transforms, the camera, handedness, fronts.
 
 use super::*;
-use crate::desc::{CameraKindDesc, FilterDesc, IntegratorDesc, LightDesc};
+use crate::desc::{AutoDesc, CameraKindDesc, FilterDesc, IntegratorDesc, LightDesc};
 
 /// Where the camera shows a point of pbrt's world: to the right and up, in units of the distance.
 fn seen(imported: &Imported, p: DVec3) -> [f64; 2] {
@@ -198,7 +198,10 @@ fn options_are_pbrts_defaults_and_values() {
         \"string filename\" \"a.exr\"
         WorldBegin";
     let desc = read(text).desc;
-    assert!(matches!(desc.integrator, IntegratorDesc::Path { max_depth: 1, .. }));
+    assert!(matches!(desc.integrator, IntegratorDesc::Path { max_depth: 1, bidirectional: AutoDesc::Auto, .. }));
+    let imported = read("Integrator \"bdpt\" WorldBegin");
+    assert!(imported.report.is_exact());
+    assert!(matches!(imported.desc.integrator, IntegratorDesc::Path { bidirectional: AutoDesc::On, .. }));
     assert_eq!((desc.sampler.spp, desc.film.filter), (7, FilterDesc::Tent { radius: 1.0, samples: None }));
     assert_eq!((desc.film.crop, desc.outputs[0].file.as_str()), (Some([10, 25, 40, 25]), "a.exr"));
 }
