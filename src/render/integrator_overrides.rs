@@ -116,10 +116,13 @@ fn set_caustics(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Resul
 
 fn set_bidirectional(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Result<()> {
     if let Some(chosen) = overrides.bidirectional {
-        let IntegratorDesc::Path { bidirectional, .. } = integrator else {
-            return Err(refused("bidirectional", ": only the integrator path traces light paths"));
-        };
-        *bidirectional = chosen;
+        match integrator {
+            IntegratorDesc::Path { bidirectional, .. } => *bidirectional = chosen,
+            _ if chosen == AutoDesc::On => {
+                return Err(refused("bidirectional", ": only the integrator path traces light paths"));
+            }
+            _ => {}
+        }
     }
     let unsupported =
         unsupported_with_light_paths(integrator, overrides.guide.is_some(), overrides.target_error.is_some());

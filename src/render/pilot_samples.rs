@@ -46,6 +46,15 @@ struct PilotPixel {
     excess: [f64; 3],
 }
 
+impl PilotPixel {
+    /// The sum over the channels of the variance of one of so many samples, times these factors.
+    fn weighted_variance(&self, factors: [f64; 3], samples: u32) -> f64 {
+        let variance = |k: usize| (self.square[k] - self.radiance[k] * self.radiance[k]).max(0.0);
+        let sum = (0..3).map(|k| factors[k] * variance(k)).sum::<f64>();
+        sum * f64::from(samples) / f64::from(samples - 1)
+    }
+}
+
 /// The samples of a pilot.
 #[derive(Clone, Debug)]
 pub(super) struct PilotSamples {
@@ -146,16 +155,22 @@ impl PilotSamples {
         mean(self.means.iter().map(|pixel| pixel.radiance))
     }
 
+    /// The mean variance of a sample over the square of the colour, by pixel and channel.
+    pub fn relative_variance(&self) -> f64 {
+        let factors = self.pixels.relative_to(|i| self.means[i].radiance);
+        let pixels = self.means.iter().zip(factors);
+        pixels.map(|(pixel, factors)| pixel.weighted_variance(factors, self.samples)).sum::<f64>()
+            / (3 * self.means.len()) as f64
+    }
+
     /// The variance of a sample without the method over that with it; `None` if the samples are black or all alike. A
     /// part of the pixels, those where that differs most, is left out.
     pub fn gain(&self, left_out: f64) -> Option<Estimate> {
         let factors = self.pixels.relative_to(|i| self.means[i].radiance);
-        let count = f64::from(self.samples);
         // Relative variances: that with the method, and how much more it is without.
         let of_pixel = |(pixel, factors): (&PilotPixel, [f64; 3])| {
-            let variance = |k: usize| (pixel.square[k] - pixel.radiance[k] * pixel.radiance[k]).max(0.0);
-            let sum = |of: &dyn Fn(usize) -> f64| (0..3).map(|k| factors[k] * of(k)).sum::<f64>();
-            [sum(&variance) * count / (count - 1.0), sum(&|k| pixel.excess[k])]
+            let excess = (0..3).map(|k| factors[k] * pixel.excess[k]).sum::<f64>();
+            [pixel.weighted_variance(factors, self.samples), excess]
         };
         let mut pixels: Vec<[f64; 2]> = self.means.iter().zip(factors).map(of_pixel).collect();
         if left_out > 0.0 {

@@ -5,6 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::Faults;
 use crate::accel::{self, AccelKind};
+use crate::desc::AutoDesc;
 use crate::film::Image;
 use crate::render::{self, Overrides, RenderResult, Settings, Silent};
 use crate::scene::Scene;
@@ -39,7 +40,10 @@ pub fn render_with(prepared: &Prepared, kind: AccelKind) -> RenderResult {
 
 /// Renders a scene given as JSON through Embree.
 pub fn render(scene: &Value) -> Image {
-    render_with(&prepare(scene, &Overrides { threads: Some(2), ..Overrides::default() }), AccelKind::EMBREE).image
+    // Estimates take pixels for independent of each other: those that share light paths are not.
+    let bidirectional = Some(AutoDesc::Off);
+    let overrides = Overrides { threads: Some(2), bidirectional, ..Overrides::default() };
+    render_with(&prepare(scene, &overrides), AccelKind::EMBREE).image
 }
 
 /// A scene with a camera at `position` looking at `look_at` through a very narrow angle, so that all pixels see nearly
