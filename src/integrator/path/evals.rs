@@ -103,7 +103,7 @@ fn eval_diffuse(rows: &VertexRows, directions: &Vec3Rows, evals: &mut EvalRows, 
 
 #[inline(always)]
 fn reversed_diffuse_pdfs(rows: &VertexRows, wi: &Vec3Rows, pdfs: &mut Row, count: usize) {
-    for i in 0..count.min(BATCH) {
-        pdfs[i] = Lambert { albedo: rows.albedo.get(i) }.eval(wi.get(i), rows.wo.get(i)).pdf;
+    for (i, pdf) in pdfs.iter_mut().enumerate().take(count.min(BATCH)) {
+        *pdf = Lambert { albedo: rows.albedo.get(i) }.eval(wi.get(i), rows.wo.get(i)).pdf;
     }
 }
