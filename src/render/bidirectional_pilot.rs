@@ -36,7 +36,7 @@ pub(super) fn pays(
 ) -> bool {
     let unconnected = trace(renderer, UNCONNECTED_SAMPLES, workspaces);
     renderer.light_paths = Some(light_paths.for_pilot());
-    let light_rays = renderer.trace_photons(FIRST_SAMPLE, workspaces).total() as f64;
+    let light_rays = renderer.trace_from_lights(FIRST_SAMPLE, workspaces).total() as f64;
     let connected = trace(renderer, SAMPLES, workspaces);
     renderer.light_paths = None;
     // Light paths are shared by all samples of an epoch.

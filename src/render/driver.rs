@@ -99,8 +99,13 @@ impl Driver<'_> {
         let mut stats = Stats::default();
         state.start(self.session);
         // Its rays are of no sample: a resumed render and a shard trace it again.
-        self.pool.install(|| self.renderer.prepare(&self.workspaces, state.bidirectional));
-        state.set_bidirectional(self.renderer.is_bidirectional());
+        // Pictures that were begun without a decision go on as they are.
+        let is_bidirectional = state.bidirectional.or((state.done > 0).then_some(false));
+        self.pool.install(|| self.renderer.prepare(&self.workspaces, is_bidirectional));
+        // A pilot that was cancelled has decided nothing.
+        if !self.renderer.context.is_cancelled() {
+            state.set_bidirectional(self.renderer.is_bidirectional());
+        }
         let all = state.film.tiles().len();
         let mut size =
             PassSize { samples: 1, tiles: if self.max_pass_time().is_some() { FIRST_TILES.min(all) } else { all } };
@@ -120,7 +125,7 @@ impl Driver<'_> {
                 break;
             }
             let start = Instant::now();
-            let mut rays = self.pool.install(|| self.renderer.trace_photons(pass.samples.start, &self.workspaces));
+            let mut rays = self.pool.install(|| self.renderer.trace_from_lights(pass.samples.start, &self.workspaces));
             rays.add(&self.render_pass(state, &pass));
             state.rays.add(&rays);
             if self.cancel.is_cancelled() {

@@ -56,13 +56,17 @@ impl LightPathPass {
 
     /// As many light paths as a pilot needs.
     pub fn for_pilot(&self) -> Self {
-        let traced = self.traced.min(*PATHS.start() as u32);
-        Self { emitters: self.emitters.clone(), needs_pilot: false, is_pilot: true, traced, vertices: None }
+        let (emitters, traced) = (self.emitters.clone(), self.pilot_paths());
+        Self { emitters, needs_pilot: false, is_pilot: true, traced, vertices: None }
     }
 
     /// Light paths of an epoch over those of the pilot.
     pub fn per_pilot_path(&self) -> f64 {
-        f64::from(self.traced) / f64::from(self.for_pilot().traced)
+        f64::from(self.traced) / f64::from(self.pilot_paths())
+    }
+
+    fn pilot_paths(&self) -> u32 {
+        self.traced.min(*PATHS.start() as u32)
     }
 
     /// What paths are connected to, if there is anything.

@@ -185,7 +185,7 @@ pub fn replay(
     let mut renderer = TileRenderer::new(scene, accel, settings);
     let workspace = [Mutex::<TileWorkspace>::default()];
     renderer.prepare(&workspace, None);
-    renderer.trace_photons(sample, &workspace);
+    renderer.trace_from_lights(sample, &workspace);
     let [workspace] = workspace;
     let mut workspace = workspace.into_inner().unwrap_or_else(PoisonError::into_inner);
     let pixel = pixel.map(|x| x + renderer.grid.offset);

@@ -206,8 +206,8 @@ impl<'a> TileRenderer<'a> {
         self.integrator.trace_pilot(&self.pass(Guidance::default()), samples, integrator, records);
     }
 
-    /// Traces the photons of a sample's epoch, unless they are there; the result is the rays traced.
-    pub fn trace_photons(&mut self, sample: u32, workspaces: &[Mutex<TileWorkspace>]) -> RayCounts {
+    /// Traces the photons or light paths of a sample's epoch, unless they are there; the result is the rays traced.
+    pub fn trace_from_lights(&mut self, sample: u32, workspaces: &[Mutex<TileWorkspace>]) -> RayCounts {
         let mut counts = RayCounts::default();
         if let Some(mut light_paths) = self.light_paths.take() {
             counts.add(&light_paths.trace(

@@ -49,7 +49,7 @@ pub struct LightVertex {
     pub segments: u32,
     /// What other strategies weigh.
     pub mis: PartialMis,
-    /// The part of it that is not of connections: lights that are sampled, or met by chance.
+    /// The part of it that is not of connections, but of light and BSDF sampling.
     pub unconnected: PartialMis,
 }
 

@@ -219,7 +219,7 @@ fn connect<const PERTURBED: bool>(pairs: &Pairs, densities: &mut DensityRows, di
 }
 
 /// Finds how the squares of what connections add would grow without connections, over the squares of these: a path that
-/// lights and chance find with a density `r` times less adds `r` times more, where it is found.
+/// light and BSDF sampling find with a density `r` times less adds `r` times more, where it is found.
 #[inline(always)]
 fn find_moments(pairs: &Pairs, densities: &mut DensityRows, direct: &DirectRows, count: usize) {
     let Pairs { evals, ends, mis, lights, .. } = *pairs;
