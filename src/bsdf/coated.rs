@@ -215,6 +215,11 @@ impl Coated {
         self.coat.flags() | self.base.flags()
     }
 
+    /// Whether what is below the coat has a delta lobe.
+    pub(super) fn has_specular_base(&self) -> bool {
+        self.base.flags().contains(BsdfFlags::SPECULAR)
+    }
+
     /// What coat and base reflect together, about.
     pub fn albedo(&self, wo: Vec3) -> Rgb {
         let coat = self.coat.albedo(upper(wo));

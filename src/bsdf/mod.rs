@@ -197,6 +197,19 @@ impl Bsdf {
         each!(self, bsdf => bsdf.flags())
     }
 
+    /// Whether [`sample`](Self::sample) chooses between one mirror reflection and other lobes. It then chooses the
+    /// reflection where `u_lobe` is 0, if its probability is not 0.
+    pub fn mirrors_beside_others(&self) -> bool {
+        match self {
+            // Coat and base may have a mirror reflection each.
+            Self::Coated(bsdf) => bsdf.flags().contains(BsdfFlags::SPECULAR) && !bsdf.has_specular_base(),
+            _ => {
+                let others = BsdfFlags::DIFFUSE | BsdfFlags::GLOSSY | BsdfFlags::TRANSMISSION;
+                self.flags().contains(BsdfFlags::SPECULAR) && self.flags().intersects(others)
+            }
+        }
+    }
+
     /// An estimate of the fraction of light scattered, for the albedo layer.
     pub fn albedo(&self, wo: Vec3) -> Rgb {
         each!(self, bsdf => bsdf.albedo(wo))

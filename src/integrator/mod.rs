@@ -9,6 +9,7 @@ mod cancel;
 mod caustics;
 mod cones;
 mod debug;
+mod emitter_prims;
 mod light_events;
 mod media;
 mod participating;

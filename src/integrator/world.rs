@@ -1,5 +1,6 @@
 //! A scene with its accelerator: rays in, surface interactions out.
 
+use super::emitter_prims::EmitterPrims;
 use super::subsurface::SubsurfaceShapes;
 use crate::accel::Accelerator;
 use crate::color::Rgb;
@@ -36,6 +37,8 @@ pub struct World<'a> {
     pub(super) enclosed_media: Vec<bool>,
     /// Those that light enters for a random walk.
     pub(super) subsurface: SubsurfaceShapes,
+    /// Emitters whose mirror reflections are added without choosing them.
+    pub(super) emitter_prims: Option<EmitterPrims>,
 }
 
 impl<'a> World<'a> {
@@ -51,6 +54,7 @@ impl<'a> World<'a> {
             media_bounds: super::media::bounds(scene),
             enclosed_media: super::media::enclosed(scene),
             subsurface: SubsurfaceShapes::new(scene),
+            emitter_prims: EmitterPrims::new(scene),
         }
     }
 

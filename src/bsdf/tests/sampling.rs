@@ -63,3 +63,34 @@ fn nothing_crosses_an_opaque_surface_and_all_that_crosses_says_so() {
         }
     }
 }
+
+/// What is known of a mirror reflection beside other lobes is what choosing among them finds.
+#[test]
+fn the_first_lobe_is_the_mirror_reflection() {
+    const STEPS: u32 = 4096;
+    let coat = |alpha, base| Bsdf::coated(Coat::new(1.5, alpha), Rgb::WHITE, base);
+    let layered = [coat([0.0; 2], gold([0.3; 2])), coat([0.2; 2], white_plastic([0.0; 2]))];
+    let smooth = [white_plastic([0.0; 2]), glass([0.0; 2]), beckmann_glass([0.0; 2])];
+    let pane = Bsdf::ThinDielectric(ThinDielectric::new(1.5));
+    let mut mirrors = 0;
+    for bsdf in smooth.into_iter().chain(layered).chain([pane]).chain(rough_bsdfs().into_iter().map(|(_, bsdf)| bsdf)) {
+        if !bsdf.mirrors_beside_others() {
+            continue;
+        }
+        mirrors += 1;
+        for cos in [1.0, 0.6, 0.1, -0.3, -0.9] {
+            let wo = direction(cos, 0.2);
+            let reflected =
+                |u_lobe| bsdf.sample(wo, u_lobe, [0.5; 2]).filter(|sample| sample.is_delta && !sample.is_transmission);
+            let first = reflected(0.0).unwrap();
+            let chosen = (0..STEPS).filter_map(|step| reflected((step as f32 + 0.5) / STEPS as f32));
+            let sum = chosen.fold(Rgb::BLACK, |sum, sample| {
+                assert_eq!((sample.wi, sample.pdf), (first.wi, first.pdf), "{bsdf:?}");
+                sum + sample.weight
+            });
+            let (mean, known) = (sum / STEPS as f32, first.weight * first.pdf);
+            assert!((mean - known).map(f32::abs).max_channel() < 1.0 / STEPS as f32, "{bsdf:?} {mean:?} {known:?}");
+        }
+    }
+    assert_eq!(mirrors, 5);
+}

@@ -25,6 +25,8 @@ pub(super) mod vertex_flags {
     pub const MEDIUM: u32 = 8;
     /// No shadow ray from here reaches a light.
     pub const ENCLOSED: u32 = 16;
+    /// See [`Bsdf::mirrors_beside_others`].
+    pub const MIRRORS: u32 = 32;
     /// Where no light is sampled.
     pub const UNSAMPLED: u32 = DELTA | MISS | ENCLOSED;
 }
@@ -216,6 +218,8 @@ pub(super) struct Vertices {
     /// For the directions of `light_samples`.
     pub light_evals: EvalRows,
     pub direct: DirectRows,
+    /// Whether the light of `direct` leaves by mirror reflection.
+    pub is_direct_specular: bool,
     pub scatter: ScatterRows,
     /// Paths of the block that leave the scene.
     pub misses: Vec<u8>,
@@ -320,6 +324,15 @@ impl Vertices {
         match self.bsdfs.get(scene, lane) {
             None => Lambert { albedo: self.albedo(lane) }.eval(wi, wo),
             Some(bsdf) => bsdf.eval(wi, wo),
+        }
+    }
+
+    /// How the light of `direct` leaves a vertex along its path.
+    pub fn direct_lobes(&self, scene: &Scene, lane: usize) -> LobeWeights {
+        if self.is_direct_specular {
+            LobeWeights::Reflected { diffuse: Rgb::BLACK }
+        } else {
+            self.lobes(scene, lane, self.light_evals.wi.get(lane))
         }
     }
 

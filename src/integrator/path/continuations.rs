@@ -34,6 +34,8 @@ pub(super) struct ContinuationRecorder {
     unoccluded: u64,
     /// The shadow rays of the wave that are towards the first lights of first vertices.
     first_lights: Vec<Range<usize>>,
+    /// Those along delta lobes.
+    specular: Vec<Range<usize>>,
     /// What they bring less what those towards the second lights bring, by sample.
     light_differences: Vec<f32>,
 }
@@ -81,13 +83,26 @@ impl ContinuationRecorder {
         }
     }
 
+    /// These shadow rays of the wave, all after those of calls before, are along delta lobes of first vertices.
+    pub fn mark_specular(&mut self, rays: Range<usize>) {
+        if self.is_enabled {
+            self.specular.push(rays);
+        }
+    }
+
     /// Records what a shadow ray of a first vertex brings.
     pub fn add_direct(&mut self, ray: usize, slot: u32, light: Rgb) {
         if !self.is_enabled {
             return;
         }
-        let range = self.first_lights.partition_point(|range| range.end <= ray);
-        let is_first = self.first_lights.get(range).is_some_and(|range| range.contains(&ray));
+        let is_in = |ranges: &[Range<usize>]| {
+            let range = ranges.partition_point(|range| range.end <= ray);
+            ranges.get(range).is_some_and(|range| range.contains(&ray))
+        };
+        if is_in(&self.specular) {
+            return;
+        }
+        let is_first = is_in(&self.first_lights);
         let slot = slot as usize;
         if self.light_differences.len() <= slot {
             self.light_differences.resize(slot + 1, 0.0);

@@ -57,15 +57,26 @@ fn sample_once(context: &Context, regions: Option<&Regions>, wave: &mut Wave, bl
     if let Some(regions) = regions {
         guided.mix_light_pdfs(regions, vertices);
     }
-    let Vertices { rows, points, light_samples: lights, light_evals: evals, direct, .. } = &mut *vertices;
     let mis = context.config.strategy == Strategy::Mis;
-    let weighting = Weighting { mis, light_samples: context.light_samples() as f32 };
-    if context.scene.features.normal_perturbations {
+    let weighting = Weighting { mis, light_samples: context.light_samples() as f32, shadowed: true };
+    illuminate_all(context, vertices, weighting);
+    super::connection_mis::reweigh_light_samples(context, wave);
+    finish(context, wave, block);
+}
+
+/// Direct light of light samples for which the BSDFs have been evaluated.
+pub(super) fn illuminate_all(context: &Context, vertices: &mut Vertices, weighting: Weighting) {
+    let Vertices { count, rows, points, light_samples: lights, light_evals: evals, direct, .. } = vertices;
+    let count = *count;
+    if weighting.shadowed && context.scene.features.normal_perturbations {
         vectorize!(illuminate::<true>(rows, points, lights, evals, direct, weighting, count));
     } else {
         vectorize!(illuminate::<false>(rows, points, lights, evals, direct, weighting, count));
     }
-    super::connection_mis::reweigh_light_samples(context, wave);
+}
+
+/// Russian roulette of a block's shadow rays, and what else may keep light from arriving.
+pub(super) fn finish(context: &Context, wave: &mut Wave, block: usize) {
     if let Some(grid) = context.pass.continuations {
         roulette(grid, &mut wave.vertices);
     }
@@ -114,11 +125,13 @@ fn choose_lights(context: &Context, vertices: &mut Vertices, queue: &mut LightQu
 
 /// How light samples are weighted.
 #[derive(Clone, Copy)]
-struct Weighting {
+pub(super) struct Weighting {
     /// Against the density of the BSDF.
-    mis: bool,
+    pub mis: bool,
     /// How many each vertex has.
-    light_samples: f32,
+    pub light_samples: f32,
+    /// Whether normal and bump maps shadow.
+    pub shadowed: bool,
 }
 
 #[inline(always)]

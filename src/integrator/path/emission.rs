@@ -5,7 +5,7 @@ use super::caustics::CausticState;
 use super::connection_mis::ConnectionState;
 use super::equiangular::{DirectionPdfs, SegmentVertex};
 use super::radiance::Output;
-use super::wave::{PathRows, Wave};
+use super::wave::{PathRows, Wave, path_flags};
 use crate::color::Rgb;
 use crate::geometry::SurfaceInteraction;
 use crate::id::LightId;
@@ -47,6 +47,9 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
     for &lane in &vertices.emitters {
         let lane = usize::from(lane);
         let i = vertices.path(lane);
+        if paths.flags[i] & path_flags::EMISSION_ADDED != 0 {
+            continue;
+        }
         let at = vertices.interaction(lane);
         let departure = media.get(block * BATCH + i).and_then(|state| state.departure.as_ref());
         let (caustic, connection) = (caustics.get(block * BATCH + i), connections.get(block * BATCH + i));

@@ -190,7 +190,8 @@ fn set_non_diffuse(rows: &mut VertexRows, non_diffuse: &mut Vec<u8>, lane: usize
 fn flags(bsdf: &Bsdf) -> u32 {
     let delta = if bsdf.flags().is_delta() { vertex_flags::DELTA } else { 0 };
     let transmits = if bsdf.flags().transmits() { vertex_flags::TRANSMITS } else { 0 };
-    delta | transmits
+    let mirrors = if bsdf.mirrors_beside_others() { vertex_flags::MIRRORS } else { 0 };
+    delta | transmits | mirrors
 }
 
 /// Sorts the vertices that are not diffuse by their groups.

@@ -24,6 +24,7 @@ mod miss;
 mod photons;
 mod radiance;
 mod scatter;
+mod specular_light;
 mod subsurface;
 mod surface_aovs;
 mod terminator;
@@ -32,6 +33,7 @@ mod vertices;
 mod wave;
 
 use super::cancel;
+use super::emitter_prims::EmitterPrims;
 use super::regularization::Regularization;
 use super::{
     CameraBatch, CausticCasters, Emitters, Guidance, Integrator, LightVertex, PassContext, Photon, PhotonRange,
@@ -89,6 +91,8 @@ struct Context<'a> {
     /// Whether paths end at this vertex.
     is_last: bool,
     compensation: MisCompensation,
+    /// See `specular_light`.
+    emitter_prims: Option<&'a EmitterPrims>,
 }
 
 impl Context<'_> {
@@ -223,8 +227,16 @@ impl PathIntegrator {
         let PassContext { world, render, guidance: Guidance { guide, learner, .. }, .. } = *pass;
         let Workspace { out, counts, paths: PathBuffers(wave) } = workspace;
         let (compensation, out) = (self.strategy.compensation(), &mut Output { batch: out });
-        let mut context =
-            Context { config: self, pass, world, scene: world.scene, bounce: 0, is_last: false, compensation };
+        let mut context = Context {
+            config: self,
+            pass,
+            world,
+            scene: world.scene,
+            bounce: 0,
+            is_last: false,
+            compensation,
+            emitter_prims: specular_light::emitters(self, pass),
+        };
         wave.start(&context, samples);
         for bounce in 0..self.max_depth {
             if wave.count == 0 || (bounce % cancel::BOUNCES == 0 && render.is_cancel_due()) {
@@ -261,6 +273,7 @@ impl PathIntegrator {
                     connection_mis::arrive(wave, block);
                     connections::sample(context, wave, block);
                 }
+                specular_light::add(context, wave, block);
                 direct::sample(context, regions.as_ref(), wave, block);
                 caustics::gather(context, wave, block, out);
                 scatter::sample(context, regions.as_ref(), wave, block);

@@ -4,6 +4,7 @@ use super::Context;
 use super::block::{PointRows, ScatterRows, VertexRows, Vertices, spawn, vertex_flags};
 use super::direct::{can_be_below, shadowing};
 use super::guided::Regions;
+use super::specular_light;
 use super::terminator;
 use super::wave::{BsdfScratch, Wave, path_flags};
 use crate::bsdf::Lambert;
@@ -37,6 +38,7 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
     let rule = SpawnRule {
         survival: context.config.roulette.rule(context.bounce, continuations.is_some()),
         no_lights: context.scene.lights.is_empty(),
+        added_by: specular_light::added_by(context),
     };
     if context.scene.features.normal_perturbations {
         vectorize!(spawn_rays::<true>(rows, points, scatter, u_bsdf, rule, count));
@@ -113,6 +115,9 @@ fn sample_diffuse(rows: &VertexRows, scatter: &mut ScatterRows, u: &SampleRows, 
 struct SpawnRule {
     survival: SurvivalRule,
     no_lights: bool,
+    /// Flags of which vertices whose mirror reflection of emitters has been added have only
+    /// [`MIRRORS`](vertex_flags::MIRRORS).
+    added_by: u32,
 }
 
 #[inline(always)]
@@ -153,7 +158,10 @@ fn spawn_rays<const PERTURBED: bool>(
         let specular = if is_unsampled { path_flags::SPECULAR } else { 0 };
         let non_specular =
             if is_delta { rows.path_flags[i] & path_flags::ANY_NON_SPECULAR } else { path_flags::ANY_NON_SPECULAR };
-        scatter.path_flags[i] = specular | non_specular;
+        let is_added =
+            is_delta & (scatter.is_transmission[i] == 0) & (rows.flags[i] & rule.added_by == vertex_flags::MIRRORS);
+        let added = if is_added { path_flags::EMISSION_ADDED } else { 0 };
+        scatter.path_flags[i] = specular | non_specular | added;
         scatter.status[i] = spawn::status(goes_on & test.agrees(), goes_on & can_be_below(rows, test, i));
     }
 }

@@ -10,6 +10,7 @@ use super::light_aovs::{LightAovs, PathMove};
 use super::light_paths::LightPathState;
 use super::miss::MissScratch;
 use super::photons::PhotonState;
+use super::specular_light::SpecularRows;
 use super::terminator::TerminatorRays;
 use super::{Context, dimensions};
 use crate::accel::HitRows;
@@ -32,6 +33,8 @@ pub(super) mod path_flags {
     pub const SPECULAR: u32 = 1;
     /// Some vertex has scattered the path by a lobe that is no delta.
     pub const ANY_NON_SPECULAR: u32 = 2;
+    /// What emitters send along the last direction has been added at the last vertex.
+    pub const EMISSION_ADDED: u32 = 4;
 }
 
 soa! {
@@ -159,6 +162,7 @@ pub(super) struct Wave {
     pub light_queue: LightQueue,
     pub miss: MissScratch,
     pub bsdf_rows: BsdfScratch,
+    pub specular_rows: SpecularRows,
     /// Rays that stages have traced beside those of paths and shadow rays.
     pub counts: RayCounts,
 }
@@ -295,7 +299,7 @@ impl Wave {
         let lanes = Compaction::equal(&direct.status, spawn::SPAWNED, *count);
         if context.config.needs_light_aovs() {
             for lane in (0..BATCH).filter(|&lane| lanes.contains(lane)) {
-                let lobes = || self.vertices.lobes(context.scene, lane, self.vertices.light_evals.wi.get(lane));
+                let lobes = || self.vertices.direct_lobes(context.scene, lane);
                 let path = block * BATCH + self.vertices.path(lane);
                 let event = self.light_aovs.shadow_event(context, path, scatterings, lobes);
                 self.light_aovs.shadow_sources.push((event, LightId(self.vertices.light_samples.light[lane])));

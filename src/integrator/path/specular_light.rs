@@ -1,0 +1,198 @@
+//! Light that emitters send along mirror reflections which scattering chooses among other lobes: in varnish, plastic
+//! and glass.
+//!
+//! A path that scatters by such a lobe finds the emitter with the probability of the lobe, a few in a hundred, and then
+//! is as bright as the emitter. In scenes with few emitters the light is added without choosing: the direction of the
+//! reflection is known, so it is tested against the emitters, and a shadow ray is traced to the one that it meets.
+//! Paths that do scatter by the lobe leave out the emission they meet. `docs/performance.md` has what it brings.
+
+use super::block::{EvalRows, PointRows, VertexRows, Vertices, vertex_flags};
+use super::direct::{self, Weighting};
+use super::materials::BsdfTable;
+use super::wave::{BsdfScratch, Wave};
+use super::{Context, EmitterPrims, PassContext, PathIntegrator, Strategy};
+use crate::color::Rgb;
+use crate::geometry::{SpawnPoint, SurfaceInteraction};
+use crate::id::LightId;
+use crate::light::{Light, light_target};
+use crate::math::rows::{BATCH, Row, soa};
+use crate::math::vectorize::vectorize;
+use crate::math::{Frame, Ray, Vec3};
+
+soa! {
+    /// Mirror reflections of the vertices of a block.
+    pub(super) struct SpecularRows {
+        /// 0 or 1.
+        has_lobe: u32,
+        /// Unit direction of the reflection.
+        direction: Vec3,
+        /// A bit for each emitter that it may meet.
+        near: u32,
+    }
+}
+
+/// The emitters for which this is done: all of a scene, or none.
+pub(super) fn emitters<'a>(config: &PathIntegrator, pass: &PassContext<'a>) -> Option<&'a EmitterPrims> {
+    // In media, shadow rays pass what paths meet.
+    let is_plain = config.strategy == Strategy::Mis && !pass.world.scene.features.media;
+    pass.world.emitter_prims.as_ref().filter(|_| is_plain)
+}
+
+/// Flags of vertices, of which those whose reflections are added have only [`vertex_flags::MIRRORS`].
+///
+/// After the first scattering photons and light paths have weights against finding emitters by reflection; and glass is
+/// left out, for paths within it seldom meet emitters.
+pub(super) fn added_by(context: &Context) -> u32 {
+    let is_weighted = context.pass.caustics.is_some() || context.pass.light_paths.is_some();
+    match (context.emitter_prims, context.bounce) {
+        (None, _) => 0,
+        (Some(_), 0) => vertex_flags::MIRRORS,
+        (Some(_), _) if is_weighted => 0,
+        (Some(_), _) => vertex_flags::MIRRORS | vertex_flags::TRANSMITS,
+    }
+}
+
+/// Queues the shadow rays of a block's vertices along mirror reflections.
+pub(super) fn add(context: &Context, wave: &mut Wave, block: usize) {
+    let Some(emitters) = context.emitter_prims.filter(|_| added_by(context) != 0) else { return };
+    if !find_emitters(context, emitters, wave) {
+        return;
+    }
+    let first = wave.shadows.count;
+    wave.vertices.is_direct_specular = true;
+    let weighting = Weighting { mis: false, light_samples: 1.0, shadowed: false };
+    direct::illuminate_all(context, &mut wave.vertices, weighting);
+    direct::finish(context, wave, block);
+    wave.queue_shadow_rays(context, block, 0);
+    wave.vertices.is_direct_specular = false;
+    if context.bounce == 0 {
+        wave.continuations.mark_specular(first..wave.shadows.count);
+    }
+}
+
+/// Sets light samples and evaluations for vertices whose mirror reflection meets an emitter; false if there are none.
+fn find_emitters(context: &Context, emitters: &EmitterPrims, wave: &mut Wave) -> bool {
+    let Wave { vertices, bsdf_rows, specular_rows: found, .. } = wave;
+    let count = vertices.count;
+    if !sample_reflections(context, vertices, bsdf_rows, &mut found.has_lobe) {
+        return false;
+    }
+    let Vertices { rows, points, light_evals, .. } = &*vertices;
+    vectorize!(aim(emitters, rows, points, light_evals, found, count));
+    let mut is_any = false;
+    vertices.light_samples.target[..count].fill(light_target::NONE);
+    for lane in (0..count).filter(|&lane| found.near[lane] != 0) {
+        is_any |= set_light(context, emitters, vertices, lane, found);
+    }
+    is_any
+}
+
+/// Samples the mirror reflection of all vertices that have it beside other lobes; false if there are none.
+fn sample_reflections(
+    context: &Context,
+    vertices: &mut Vertices,
+    scratch: &mut BsdfScratch,
+    has_lobe: &mut Row<u32>,
+) -> bool {
+    has_lobe[..vertices.count].fill(0);
+    let mut is_any = false;
+    let Vertices { rows, light_evals: evals, non_diffuse, bsdfs, .. } = vertices;
+    for lanes in bsdfs.groups(non_diffuse) {
+        if rows.flags[usize::from(lanes[0])] & added_by(context) != vertex_flags::MIRRORS {
+            continue;
+        }
+        sample_group(context, rows, bsdfs, lanes, scratch);
+        let samples = &scratch.samples;
+        for (i, &lane) in lanes.iter().enumerate() {
+            let lane = usize::from(lane);
+            if samples.is_valid[i] & samples.is_delta[i] != 0 && samples.is_transmission[i] == 0 {
+                has_lobe[lane] = 1;
+                evals.wi.set(lane, samples.wi.get(i));
+                evals.value.set(lane, samples.weight.get(i) * samples.pdf[i]);
+                is_any = true;
+            }
+        }
+    }
+    is_any
+}
+
+/// Finds the directions of reflections in the world, and the emitters that they may meet.
+#[inline(always)]
+fn aim(
+    emitters: &EmitterPrims,
+    rows: &VertexRows,
+    points: &PointRows,
+    evals: &EvalRows,
+    found: &mut SpecularRows,
+    count: usize,
+) {
+    for i in 0..count.min(BATCH) {
+        let frame = Frame { x: rows.frame_x.get(i), y: rows.frame_y.get(i), z: rows.n.get(i) };
+        found.direction.set(i, frame.to_world(evals.wi.get(i)));
+        found.near[i] = 0;
+    }
+    for (bit, around) in emitters.boxes().enumerate() {
+        for i in 0..count.min(BATCH) {
+            let is_near = around.may_be_met(points.p.get(i).as_vec3(), found.direction.get(i));
+            found.near[i] |= (u32::from(is_near) & found.has_lobe[i]) << bit;
+        }
+    }
+}
+
+/// Samples the mirror reflection of vertices that have one BSDF.
+fn sample_group(context: &Context, vertices: &VertexRows, bsdfs: &BsdfTable, lanes: &[u8], rows: &mut BsdfScratch) {
+    let BsdfScratch { queries, samples, .. } = rows;
+    let Some(bsdf) = bsdfs.get(context.scene, usize::from(lanes[0])) else { return };
+    let varies = bsdfs.varies(usize::from(lanes[0]));
+    for (i, &lane) in lanes.iter().enumerate() {
+        queries.wo.set(i, vertices.wo.get(usize::from(lane)));
+        // Reflection comes first.
+        (queries.u_lobe[i], queries.u[i], queries.v[i]) = (0.0, 0.5, 0.5);
+    }
+    if varies {
+        bsdfs.set_parameters(context.scene, lanes, queries);
+    }
+    bsdf.sample_rows(queries, varies, lanes.len(), samples);
+}
+
+/// Sets the light sample of a vertex to what its reflection meets of the emitters that it may meet, if it does.
+fn set_light(
+    context: &Context,
+    emitters: &EmitterPrims,
+    vertices: &mut Vertices,
+    lane: usize,
+    found: &SpecularRows,
+) -> bool {
+    let direction = found.direction.get(lane);
+    let VertexRows { n_g, error, time, .. } = &vertices.rows;
+    let start = SpawnPoint { p: vertices.points.p.get(lane), n: n_g.get(lane), error: error[lane] };
+    let ray = Ray { time: time[lane], ..start.ray_along(direction) };
+    let Some((id, radiance, at)) = emitted(context, emitters, &ray, found.near[lane]) else { return false };
+    let Vertices { light_samples: lights, light_evals: evals, points, .. } = vertices;
+    lights.light[lane] = id.0;
+    lights.target[lane] = light_target::POINT;
+    lights.is_delta[lane] = 1;
+    lights.direction.set(lane, direction);
+    lights.radiance.set(lane, radiance);
+    lights.pdf[lane] = 1.0;
+    points.target_p.set(lane, at.p);
+    lights.target_n.set(lane, at.n_g);
+    lights.target_error[lane] = at.error;
+    evals.pdf[lane] = 0.0;
+    true
+}
+
+/// The emitter that a ray would meet first, if nothing else were there, with what it emits against the ray.
+fn emitted(
+    context: &Context,
+    emitters: &EmitterPrims,
+    ray: &Ray,
+    near: u32,
+) -> Option<(LightId, Rgb, SurfaceInteraction)> {
+    let scene = context.scene;
+    let at = emitters.closest(context.world, ray, near)?;
+    let id = scene.surface(at.shape).light(at.prim)?;
+    let Light::Area(light) = scene.lights.get(id) else { return None };
+    let radiance = light.radiance(&scene.geometry, &scene.textures, &at, -ray.direction);
+    (!radiance.is_black()).then_some((id, radiance, at))
+}
