@@ -9,7 +9,7 @@ use steradian::internal::render::Overrides;
 
 use crate::util::render::{assert_blocks_agree, block_means, prepare, render_with};
 
-/// A varnished floor that shows two lamps to the camera and to a wall, glass, and a varnished cube within sight of both.
+/// A varnished floor that shows two lamps to the camera and to a wall, glass, and a varnished cube in sight of both.
 fn varnish() -> Value {
     json!({
         "camera": { "position": [0, 1.6, 4], "look_at": [0, 0.4, 0], "vertical_fov_degrees": 40 },
@@ -26,8 +26,8 @@ fn varnish() -> Value {
         "shapes": [
             { "type": "quad", "material": "floor", "origin": [-3, 0, 3], "edge_u": [6, 0, 0], "edge_v": [0, 0, -6] },
             { "type": "quad", "material": "wall", "origin": [-3, 0, -2], "edge_u": [6, 0, 0], "edge_v": [0, 3, 0] },
-            { "type": "quad", "material": "wall", "origin": [-0.4, 1.6, -1], "edge_u": [0.8, 0, 0], "edge_v": [0, 0, 0.8],
-              "emission": { "radiance": [16, 15, 14] } },
+            { "type": "quad", "material": "wall", "origin": [-0.4, 1.6, -1], "edge_u": [0.8, 0, 0],
+              "edge_v": [0, 0, 0.8], "emission": { "radiance": [16, 15, 14] } },
             { "type": "sphere", "material": "wall", "radius": 0.15, "transform": [{ "translate": [1, 1, 0] }],
               "emission": { "radiance": [20, 30, 40] } },
             { "type": "sphere", "material": "glass", "radius": 0.4, "transform": [{ "translate": [-1, 0.4, 0.3] }] },

@@ -95,7 +95,14 @@ struct Context<'a> {
     emitter_prims: Option<&'a EmitterPrims>,
 }
 
-impl Context<'_> {
+impl<'a> Context<'a> {
+    /// Of camera rays, or of rays that leave lights.
+    fn new(config: &'a PathIntegrator, pass: &'a PassContext<'a>) -> Self {
+        let (world, compensation) = (pass.world, config.strategy.compensation());
+        let emitter_prims = specular_light::emitters(config, pass);
+        Self { config, pass, world, scene: world.scene, bounce: 0, is_last: false, compensation, emitter_prims }
+    }
+
     /// How many lights are sampled at each vertex.
     fn light_samples(&self) -> u32 {
         self.light_samples_at(self.bounce)
@@ -224,19 +231,9 @@ impl PathIntegrator {
 
     /// The main loop.
     fn render_wave(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace) {
-        let PassContext { world, render, guidance: Guidance { guide, learner, .. }, .. } = *pass;
+        let PassContext { render, guidance: Guidance { guide, learner, .. }, .. } = *pass;
         let Workspace { out, counts, paths: PathBuffers(wave) } = workspace;
-        let (compensation, out) = (self.strategy.compensation(), &mut Output { batch: out });
-        let mut context = Context {
-            config: self,
-            pass,
-            world,
-            scene: world.scene,
-            bounce: 0,
-            is_last: false,
-            compensation,
-            emitter_prims: specular_light::emitters(self, pass),
-        };
+        let (mut context, out) = (Context::new(self, pass), &mut Output { batch: out });
         wave.start(&context, samples);
         for bounce in 0..self.max_depth {
             if wave.count == 0 || (bounce % cancel::BOUNCES == 0 && render.is_cancel_due()) {

@@ -44,17 +44,7 @@ pub(super) fn trace(
 ) {
     // No roulette: what a photon loses at mirrors and glass is little.
     let (config, pass) = (&config.for_light_paths(), &pass.for_light_paths());
-    let (world, compensation) = (pass.world, config.strategy.compensation());
-    let mut context = Context {
-        config,
-        pass,
-        world,
-        scene: world.scene,
-        bounce: 0,
-        is_last: false,
-        compensation,
-        emitter_prims: None,
-    };
+    let mut context = Context::new(config, pass);
     let Workspace { counts, paths: PathBuffers(wave), .. } = workspace;
     let mut traced = RayCounts::default();
     start(&context, source, wave);
