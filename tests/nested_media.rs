@@ -10,8 +10,7 @@ fn balls(materials: Value, balls: Value) -> Value {
         "film": { "width": 32, "height": 32, "filter": { "type": "box" } },
         "camera": { "position": [0, 0.3, 6], "look_at": [0, 0, 0], "vertical_fov_degrees": 24 },
         "sampler": { "type": "independent", "spp": 16 },
-        // With `mis` reflections of lamps are added where there are no media, in place of choosing them.
-        "integrator": { "type": "path", "max_depth": 24, "rr_depth": 6, "strategy": "light" },
+        "integrator": { "type": "path", "max_depth": 24, "rr_depth": 6 },
         "materials": { "black": { "type": "diffuse", "albedo": 0 }, "white": { "type": "diffuse", "albedo": 0.9 } },
         "lights": [{ "type": "environment", "radiance": [0.2, 0.3, 0.5] }]
     });

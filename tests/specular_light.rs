@@ -1,4 +1,4 @@
-//! Light of emitters by mirror reflections in varnish and glass, which is added without choosing them: the same picture
+//! Light of emitters by mirror reflections in varnish, which is added without choosing them: the same picture
 //! as choosing finds, with less noise, in the same layers.
 
 use serde_json::{Value, json};
@@ -9,7 +9,7 @@ use steradian::internal::render::Overrides;
 
 use crate::util::render::{assert_blocks_agree, block_means, prepare, render_with};
 
-/// A varnished floor that shows two lamps to the camera and to a wall, glass, and a varnished cube in sight of both.
+/// A varnished floor that shows two lamps to the camera and to a wall, glass, and a varnished cube.
 fn varnish() -> Value {
     json!({
         "camera": { "position": [0, 1.6, 4], "look_at": [0, 0.4, 0], "vertical_fov_degrees": 40 },

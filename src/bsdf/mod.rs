@@ -197,17 +197,14 @@ impl Bsdf {
         each!(self, bsdf => bsdf.flags())
     }
 
-    /// Whether [`sample`](Self::sample) chooses between one mirror reflection and other lobes. It then chooses the
-    /// reflection where `u_lobe` is 0, if its probability is not 0.
+    /// Whether [`sample`](Self::sample) chooses between one mirror reflection and other lobes, none of which light
+    /// crosses. It then chooses the reflection where `u_lobe` is 0, if its probability is not 0.
     pub fn mirrors_beside_others(&self) -> bool {
-        match self {
-            // Coat and base may have a mirror reflection each.
-            Self::Coated(bsdf) => bsdf.flags().contains(BsdfFlags::SPECULAR) && !bsdf.has_specular_base(),
-            _ => {
-                let others = BsdfFlags::DIFFUSE | BsdfFlags::GLOSSY | BsdfFlags::TRANSMISSION;
-                self.flags().contains(BsdfFlags::SPECULAR) && self.flags().intersects(others)
-            }
-        }
+        let flags = self.flags();
+        let is_mixed = flags.intersects(BsdfFlags::DIFFUSE | BsdfFlags::GLOSSY) && !flags.transmits();
+        // Coat and base may have a mirror reflection each.
+        let is_single = !matches!(self, Self::Coated(bsdf) if bsdf.has_specular_base());
+        flags.contains(BsdfFlags::SPECULAR) && is_mixed && is_single
     }
 
     /// An estimate of the fraction of light scattered, for the albedo layer.

@@ -3,7 +3,7 @@
 use super::Context;
 use super::block::{VertexRows, Vertices, vertex_flags};
 use super::wave::{Wave, path_flags};
-use crate::bsdf::{Bsdf, BsdfQueryRows, Lambert};
+use crate::bsdf::{Bsdf, BsdfFlags, BsdfQueryRows, Lambert};
 use crate::color::Rgb;
 use crate::id::{MediumId, ShapeId};
 use crate::integrator::World;
@@ -188,10 +188,11 @@ fn set_non_diffuse(rows: &mut VertexRows, non_diffuse: &mut Vec<u8>, lane: usize
 
 #[inline]
 fn flags(bsdf: &Bsdf) -> u32 {
-    let delta = if bsdf.flags().is_delta() { vertex_flags::DELTA } else { 0 };
-    let transmits = if bsdf.flags().transmits() { vertex_flags::TRANSMITS } else { 0 };
-    let mirrors = if bsdf.mirrors_beside_others() { vertex_flags::MIRRORS } else { 0 };
-    delta | transmits | mirrors
+    let lobes = bsdf.flags();
+    let delta = if lobes.is_delta() { vertex_flags::DELTA } else { 0 };
+    let transmits = if lobes.transmits() { vertex_flags::TRANSMITS } else { 0 };
+    let has_mirror = lobes.contains(BsdfFlags::SPECULAR) && bsdf.mirrors_beside_others();
+    delta | transmits | if has_mirror { vertex_flags::MIRRORS } else { 0 }
 }
 
 /// Sorts the vertices that are not diffuse by their groups.

@@ -38,7 +38,7 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
     let rule = SpawnRule {
         survival: context.config.roulette.rule(context.bounce, continuations.is_some()),
         no_lights: context.scene.lights.is_empty(),
-        added_by: specular_light::added_by(context),
+        adds_reflections: specular_light::is_added(context),
     };
     if context.scene.features.normal_perturbations {
         vectorize!(spawn_rays::<true>(rows, points, scatter, u_bsdf, rule, count));
@@ -115,9 +115,8 @@ fn sample_diffuse(rows: &VertexRows, scatter: &mut ScatterRows, u: &SampleRows, 
 struct SpawnRule {
     survival: SurvivalRule,
     no_lights: bool,
-    /// Flags of which vertices whose mirror reflection of emitters has been added have only
-    /// [`MIRRORS`](vertex_flags::MIRRORS).
-    added_by: u32,
+    /// Whether the mirror reflections of emitters have been added.
+    adds_reflections: bool,
 }
 
 #[inline(always)]
@@ -158,8 +157,7 @@ fn spawn_rays<const PERTURBED: bool>(
         let specular = if is_unsampled { path_flags::SPECULAR } else { 0 };
         let non_specular =
             if is_delta { rows.path_flags[i] & path_flags::ANY_NON_SPECULAR } else { path_flags::ANY_NON_SPECULAR };
-        let is_added =
-            is_delta & (scatter.is_transmission[i] == 0) & (rows.flags[i] & rule.added_by == vertex_flags::MIRRORS);
+        let is_added = is_delta & rule.adds_reflections & (rows.flags[i] & vertex_flags::MIRRORS != 0);
         let added = if is_added { path_flags::EMISSION_ADDED } else { 0 };
         scatter.path_flags[i] = specular | non_specular | added;
         scatter.status[i] = spawn::status(goes_on & test.agrees(), goes_on & can_be_below(rows, test, i));

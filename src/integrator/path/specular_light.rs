@@ -1,12 +1,13 @@
-//! Light that emitters send along mirror reflections which scattering chooses among other lobes: in varnish, plastic
-//! and glass.
+//! Light that emitters send along the mirror reflections of varnish and plastic, which scattering chooses among other
+//! lobes.
 //!
 //! A path that scatters by such a lobe finds the emitter with the probability of the lobe, a few in a hundred, and then
 //! is as bright as the emitter. In scenes with few emitters the light is added without choosing: the direction of the
 //! reflection is known, so it is tested against the emitters, and a shadow ray is traced to the one that it meets.
-//! Paths that do scatter by the lobe leave out the emission they meet. `docs/performance.md` has what it brings.
+//! Paths that do scatter by the lobe leave out the emission they meet. Glass is left to chance: where reflection and
+//! refraction show the same light, choosing has no noise at all. `docs/performance.md` has what it brings.
 
-use super::block::{EvalRows, PointRows, VertexRows, Vertices, vertex_flags};
+use super::block::{VertexRows, Vertices, vertex_flags};
 use super::direct::{self, Weighting};
 use super::materials::BsdfTable;
 use super::wave::{BsdfScratch, Wave};
@@ -38,23 +39,16 @@ pub(super) fn emitters<'a>(config: &PathIntegrator, pass: &PassContext<'a>) -> O
     pass.world.emitter_prims.as_ref().filter(|_| is_plain)
 }
 
-/// Flags of vertices, of which those whose reflections are added have only [`vertex_flags::MIRRORS`].
-///
-/// After the first scattering photons and light paths have weights against finding emitters by reflection; and glass is
-/// left out, for paths within it seldom meet emitters.
-pub(super) fn added_by(context: &Context) -> u32 {
+/// Whether the light is added at the vertices of this bounce. After the first scattering photons and light paths have
+/// weights against finding emitters by reflection.
+pub(super) fn is_added(context: &Context) -> bool {
     let is_weighted = context.pass.caustics.is_some() || context.pass.light_paths.is_some();
-    match (context.emitter_prims, context.bounce) {
-        (None, _) => 0,
-        (Some(_), 0) => vertex_flags::MIRRORS,
-        (Some(_), _) if is_weighted => 0,
-        (Some(_), _) => vertex_flags::MIRRORS | vertex_flags::TRANSMITS,
-    }
+    context.emitter_prims.is_some() && (context.bounce == 0 || !is_weighted)
 }
 
 /// Queues the shadow rays of a block's vertices along mirror reflections.
 pub(super) fn add(context: &Context, wave: &mut Wave, block: usize) {
-    let Some(emitters) = context.emitter_prims.filter(|_| added_by(context) != 0) else { return };
+    let Some(emitters) = context.emitter_prims.filter(|_| is_added(context)) else { return };
     if !find_emitters(context, emitters, wave) {
         return;
     }
@@ -77,8 +71,7 @@ fn find_emitters(context: &Context, emitters: &EmitterPrims, wave: &mut Wave) ->
     if !sample_reflections(context, vertices, bsdf_rows, &mut found.has_lobe) {
         return false;
     }
-    let Vertices { rows, points, light_evals, .. } = &*vertices;
-    vectorize!(aim(emitters, rows, points, light_evals, found, count));
+    vectorize!(aim(emitters, vertices, found, count));
     let mut is_any = false;
     vertices.light_samples.target[..count].fill(light_target::NONE);
     for lane in (0..count).filter(|&lane| found.near[lane] != 0) {
@@ -97,15 +90,13 @@ fn sample_reflections(
     has_lobe[..vertices.count].fill(0);
     let mut is_any = false;
     let Vertices { rows, light_evals: evals, non_diffuse, bsdfs, .. } = vertices;
-    for lanes in bsdfs.groups(non_diffuse) {
-        if rows.flags[usize::from(lanes[0])] & added_by(context) != vertex_flags::MIRRORS {
-            continue;
-        }
+    let mirrors = |&lane: &u8| rows.flags[usize::from(lane)] & vertex_flags::MIRRORS != 0;
+    for lanes in bsdfs.groups(non_diffuse).filter(|lanes| lanes.iter().any(mirrors)) {
         sample_group(context, rows, bsdfs, lanes, scratch);
         let samples = &scratch.samples;
         for (i, &lane) in lanes.iter().enumerate() {
-            let lane = usize::from(lane);
-            if samples.is_valid[i] & samples.is_delta[i] != 0 && samples.is_transmission[i] == 0 {
+            if samples.is_valid[i] & samples.is_delta[i] != 0 && mirrors(&lane) {
+                let lane = usize::from(lane);
                 has_lobe[lane] = 1;
                 evals.wi.set(lane, samples.wi.get(i));
                 evals.value.set(lane, samples.weight.get(i) * samples.pdf[i]);
@@ -118,14 +109,8 @@ fn sample_reflections(
 
 /// Finds the directions of reflections in the world, and the emitters that they may meet.
 #[inline(always)]
-fn aim(
-    emitters: &EmitterPrims,
-    rows: &VertexRows,
-    points: &PointRows,
-    evals: &EvalRows,
-    found: &mut SpecularRows,
-    count: usize,
-) {
+fn aim(emitters: &EmitterPrims, vertices: &Vertices, found: &mut SpecularRows, count: usize) {
+    let Vertices { rows, points, light_evals: evals, .. } = vertices;
     for i in 0..count.min(BATCH) {
         let frame = Frame { x: rows.frame_x.get(i), y: rows.frame_y.get(i), z: rows.n.get(i) };
         found.direction.set(i, frame.to_world(evals.wi.get(i)));
