@@ -38,7 +38,7 @@ pub(super) struct OrientedBox {
 }
 
 impl EmitterPrims {
-    /// Of a scene; `None` if there are none or many, or if any has holes or is placed by instances.
+    /// Those of a scene; `None` if there are none or many, or if any has holes or is placed by instances.
     pub fn new(scene: &Scene) -> Option<Self> {
         let mut shapes: Vec<ShapeId> = Vec::new();
         for light in scene.lights.lights() {
@@ -67,7 +67,7 @@ impl EmitterPrims {
         self.0.iter().map(|prim| &prim.around)
     }
 
-    /// The first that a ray meets of those that it is near to, by bits.
+    /// The first that a ray meets of those whose bits are set in `near`.
     pub fn closest(&self, world: &World, ray: &Ray, mut near: u32) -> Option<SurfaceInteraction> {
         let mut ray = *ray;
         let mut closest = None;
@@ -120,7 +120,8 @@ impl OrientedBox {
         Self { center, rows, half_size, slack: [slack, slack * center.abs().max_element()] }
     }
 
-    /// Whether a ray may meet it, by the axes that separate a line from a box; without branches.
+    /// Whether a ray may meet it, by the axes that separate a line from a box; without branches. It may where numbers
+    /// are infinite.
     #[inline(always)]
     pub fn may_be_met(&self, origin: Vec3, direction: Vec3) -> bool {
         let from = origin - self.center;
@@ -129,11 +130,12 @@ impl OrientedBox {
         let largest = from.x.abs().max(from.y.abs()).max(from.z.abs());
         let half = self.half_size + Vec3::splat(self.slack[0] * largest + self.slack[1]);
         let size = d.abs();
-        let is_ahead = -o.dot(d) >= -half.length() * d.length();
-        is_ahead
-            & ((o.y * d.z - o.z * d.y).abs() <= half.y * size.z + half.z * size.y)
-            & ((o.z * d.x - o.x * d.z).abs() <= half.z * size.x + half.x * size.z)
-            & ((o.x * d.y - o.y * d.x).abs() <= half.x * size.y + half.y * size.x)
+        let is_behind = o.dot(d) > half.length() * d.length();
+        let is_apart = is_behind
+            | ((o.y * d.z - o.z * d.y).abs() > half.y * size.z + half.z * size.y)
+            | ((o.z * d.x - o.x * d.z).abs() > half.z * size.x + half.x * size.z)
+            | ((o.x * d.y - o.y * d.x).abs() > half.x * size.y + half.y * size.x);
+        !is_apart
     }
 }
 

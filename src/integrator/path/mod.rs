@@ -91,12 +91,12 @@ struct Context<'a> {
     /// Whether paths end at this vertex.
     is_last: bool,
     compensation: MisCompensation,
-    /// See `specular_light`.
+    /// The emitters whose mirror reflections are added, if that is done at all.
     emitter_prims: Option<&'a EmitterPrims>,
 }
 
 impl<'a> Context<'a> {
-    /// Of camera rays, or of rays that leave lights.
+    /// At the start of a wave.
     fn new(config: &'a PathIntegrator, pass: &'a PassContext<'a>) -> Self {
         let (world, compensation) = (pass.world, config.strategy.compensation());
         let emitter_prims = specular_light::emitters(config, pass);
