@@ -25,7 +25,7 @@ pub(super) mod vertex_flags {
     pub const MEDIUM: u32 = 8;
     /// No shadow ray from here reaches a light.
     pub const ENCLOSED: u32 = 16;
-    /// See [`Bsdf::mirrors_beside_others`].
+    /// Mirror reflection is one of several lobes.
     pub const MIRRORS: u32 = 32;
     /// Where no light is sampled.
     pub const UNSAMPLED: u32 = DELTA | MISS | ENCLOSED;
