@@ -130,7 +130,7 @@ mod scene_files;
 /// Renders in parts, put together.
 mod shards;
 /// Subdivision surfaces and displacement.
-mod specular_light;
+mod specular_direct;
 mod subdivision;
 /// Random walks below surfaces.
 mod subsurface;

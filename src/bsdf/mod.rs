@@ -197,12 +197,12 @@ impl Bsdf {
         each!(self, bsdf => bsdf.flags())
     }
 
-    /// Whether [`sample`](Self::sample) chooses between one mirror reflection and other lobes, none of which light
-    /// crosses. It then chooses the reflection where `u_lobe` is 0, if its probability is not 0.
-    pub fn mirrors_beside_others(&self) -> bool {
+    /// Whether [`sample`](Self::sample) chooses between one specular reflection and other lobes, of reflection too. It
+    /// then chooses the specular one where `u_lobe` is 0, if its probability is not 0.
+    pub fn has_mixed_specular_reflection(&self) -> bool {
         let flags = self.flags();
         let is_mixed = flags.intersects(BsdfFlags::DIFFUSE | BsdfFlags::GLOSSY) && !flags.transmits();
-        // Coat and base may have a mirror reflection each.
+        // Coat and base may have a specular reflection each.
         let is_single = !matches!(self, Self::Coated(bsdf) if bsdf.has_specular_base());
         flags.contains(BsdfFlags::SPECULAR) && is_mixed && is_single
     }

@@ -1,4 +1,4 @@
-//! The surfaces that emit, of scenes with few of them: which one a ray meets first, as if nothing else were there.
+//! The emitting primitives of scenes with few of them: which one a ray meets first, without regard to occlusion.
 
 use super::World;
 use crate::geometry::{Geometry, Shape, SurfaceInteraction};
@@ -9,7 +9,7 @@ use crate::math::{Aabb, Bounds, DVec3, Ray, Transform, Vec3};
 use crate::scene::Scene;
 
 /// Up to this number of primitives, testing all of them costs less than what is gained.
-const FEW: usize = 16;
+const MAX_PRIMS: usize = 16;
 
 /// Hits of a primitive that are skipped as rounding artefacts, as those of [`World::resolve`].
 const MAX_RETRACES: u32 = 4;
@@ -23,7 +23,7 @@ pub(super) struct EmitterPrims(Vec<EmitterPrim>);
 struct EmitterPrim {
     shape: ShapeId,
     prim: PrimId,
-    around: OrientedBox,
+    bounds: OrientedBox,
 }
 
 /// A box around a primitive, which its shape's transformation has turned with it.
@@ -46,14 +46,14 @@ impl EmitterPrims {
             if shapes.last() != Some(&light.shape) {
                 shapes.push(light.shape);
             }
-            if shapes.len() > FEW {
+            if shapes.len() > MAX_PRIMS {
                 return None;
             }
         }
         let geometry = &scene.geometry;
         let count: usize = shapes.iter().map(|&shape| geometry.shape(shape).prim_count()).sum();
         let is_plain = |shape: &ShapeId| geometry.world.contains(shape) && !geometry.cutouts.has_holes(*shape);
-        if count == 0 || count > FEW || !shapes.iter().all(is_plain) {
+        if count == 0 || count > MAX_PRIMS || !shapes.iter().all(is_plain) {
             return None;
         }
         let prims = shapes.iter().flat_map(|&shape| {
@@ -62,21 +62,21 @@ impl EmitterPrims {
         Some(Self(prims.collect()))
     }
 
-    /// A box around each.
+    /// The box around each.
     pub fn boxes(&self) -> impl Iterator<Item = &OrientedBox> {
-        self.0.iter().map(|prim| &prim.around)
+        self.0.iter().map(|prim| &prim.bounds)
     }
 
-    /// The first that a ray meets of those whose bits are set in `near`.
-    pub fn closest(&self, world: &World, ray: &Ray, mut near: u32) -> Option<SurfaceInteraction> {
+    /// The first that a ray meets of those whose bits are set in `candidates`.
+    pub fn closest(&self, world: &World, ray: &Ray, mut candidates: u32) -> Option<SurfaceInteraction> {
         let mut ray = *ray;
         let mut closest = None;
-        while near != 0 {
-            if let Some(at) = self.0[near.trailing_zeros() as usize].intersect(world, &ray) {
+        while candidates != 0 {
+            if let Some(at) = self.0[candidates.trailing_zeros() as usize].intersect(world, &ray) {
                 ray.t_max = at.t;
                 closest = Some(at);
             }
-            near &= near - 1;
+            candidates &= candidates - 1;
         }
         closest
     }
@@ -84,14 +84,14 @@ impl EmitterPrims {
 
 impl EmitterPrim {
     fn of(geometry: &Geometry, shape: ShapeId, prim: PrimId) -> Self {
-        let around = match geometry.shape(shape) {
+        let bounds = match geometry.shape(shape) {
             Shape::Analytic(placed) => OrientedBox::new(&placed.shape.bounds(), &placed.transform),
             shape => {
                 let Aabb { min, max } = shape.prim_bounds(prim);
                 OrientedBox::new(&Bounds { min: min.as_dvec3(), max: max.as_dvec3() }, &Transform::IDENTITY)
             }
         };
-        Self { shape, prim, around }
+        Self { shape, prim, bounds }
     }
 
     fn intersect(&self, world: &World, ray: &Ray) -> Option<SurfaceInteraction> {
@@ -171,7 +171,7 @@ mod tests {
                 let ray = Ray::new(from, (target - from.as_dvec3()).normalize().as_vec3());
                 if geometry.shape(ShapeId(0)).intersect_prim(&ray, ShapeId(0), PrimId(0)).is_some() {
                     hits += 1;
-                    assert!(prim.around.may_be_met(ray.origin, ray.direction), "{i} {k} {ray:?}");
+                    assert!(prim.bounds.may_be_met(ray.origin, ray.direction), "{i} {k} {ray:?}");
                 }
             }
         }

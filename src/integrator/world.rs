@@ -37,7 +37,7 @@ pub struct World<'a> {
     pub(super) enclosed_media: Vec<bool>,
     /// Those that light enters for a random walk.
     pub(super) subsurface: SubsurfaceShapes,
-    /// Emitters whose mirror reflections are added without choosing them.
+    /// Emitters whose specular reflections are added without choosing among lobes.
     pub(super) emitter_prims: Option<EmitterPrims>,
 }
 

@@ -7,8 +7,8 @@ use super::super::principled::shapes::{self, ClearCoat};
 use super::super::{Ggx, SMOOTH_ALPHA};
 use super::table::{
     ALPHAS, ASPECTS, Block, CLEAR_COAT, COAT, COAT_AVERAGE, COAT_NODES, COSINES, DIFFUSE, GLASS, GLASS_AVERAGE, IORS,
-    MAX_IOR, MIRRORS, MIRRORS_AVERAGE, SCHLICK, SHAPES, SHEEN, TableCoordinate, across, cosine_axis, schlick_weight,
-    smoothed,
+    MAX_IOR, MIXED_SPECULAR, MIXED_SPECULAR_AVERAGE, SCHLICK, SHAPES, SHEEN, TableCoordinate, across, cosine_axis,
+    schlick_weight, smoothed,
 };
 use crate::math::{Vec3, sin_cos_turns, vec3};
 use crate::sampling::warp;
@@ -24,8 +24,8 @@ enum TableValue {
 
 /// The blocks in the order of the file.
 const SOURCES: [(Block, TableValue); 10] = [
-    (MIRRORS, TableValue::Number(mirrors)),
-    (MIRRORS_AVERAGE, TableValue::BlockBefore(mirrors_average)),
+    (MIXED_SPECULAR, TableValue::Number(mirrors)),
+    (MIXED_SPECULAR_AVERAGE, TableValue::BlockBefore(mirrors_average)),
     (SCHLICK, TableValue::Number(schlick)),
     (GLASS, TableValue::Number(glass)),
     (GLASS_AVERAGE, TableValue::BlockBefore(glass_average)),

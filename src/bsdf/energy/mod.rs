@@ -23,8 +23,8 @@ use super::{Ggx, Microfacets};
 use crate::math::Vec3;
 pub(super) use table::schlick_weight;
 use table::{
-    ALPHAS, ASPECTS, CLEAR_COAT, COAT, COAT_AVERAGE, COAT_NODES, COSINES, DIFFUSE, GLASS, GLASS_AVERAGE, IORS, MIRRORS,
-    MIRRORS_AVERAGE, SCHLICK, SHAPES, SHEEN, TableCoordinate, across, smoothed,
+    ALPHAS, ASPECTS, CLEAR_COAT, COAT, COAT_AVERAGE, COAT_NODES, COSINES, DIFFUSE, GLASS, GLASS_AVERAGE, IORS,
+    MIXED_SPECULAR, MIXED_SPECULAR_AVERAGE, SCHLICK, SHAPES, SHEEN, TableCoordinate, across, smoothed,
 };
 
 /// A smaller loss under diffuse light counts as none.
@@ -83,11 +83,11 @@ impl Energy {
         }
     }
 
-    /// [`MIRRORS`] at a node along the aspect, above one of the axes.
+    /// [`MIXED_SPECULAR`] at a node along the aspect, above one of the axes.
     #[inline(always)]
     fn mirrors(&self, aspect: usize, axis: usize, cosine: TableCoordinate) -> f32 {
         const AXIS: usize = ALPHAS * COSINES;
-        MIRRORS.bilinear_from((2 * aspect + axis) * AXIS, COSINES, self.at_alpha, cosine)
+        MIXED_SPECULAR.bilinear_from((2 * aspect + axis) * AXIS, COSINES, self.at_alpha, cosine)
     }
 
     /// The albedo of perfectly reflecting microfacets.
@@ -109,7 +109,7 @@ impl Energy {
 
     /// 1 minus the mean of [`Energy::directional_albedo`] under diffuse light.
     pub fn average_missing_energy(&self) -> f32 {
-        let missing = MIRRORS_AVERAGE
+        let missing = MIXED_SPECULAR_AVERAGE
             .bilinear_square(0, ALPHAS, TableCoordinate::new(self.aspect.sqrt(), ASPECTS), self.at_alpha)
             .max(MIN_LOST);
         // Between the axes of anisotropic microfacets the table is interpolated: rather a hundredth of the lobe too

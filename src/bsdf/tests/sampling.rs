@@ -64,20 +64,20 @@ fn nothing_crosses_an_opaque_surface_and_all_that_crosses_says_so() {
     }
 }
 
-/// What is known of a mirror reflection beside other lobes is what choosing among them finds.
+/// Weight times probability of a specular reflection is its mean over choices of lobes.
 #[test]
-fn the_first_lobe_is_the_mirror_reflection() {
+fn the_first_lobe_is_the_specular_reflection() {
     const STEPS: u32 = 4096;
     let coat = |alpha, base| Bsdf::coated(Coat::new(1.5, alpha), Rgb::WHITE, base);
     let layered = [coat([0.0; 2], gold([0.3; 2])), coat([0.2; 2], white_plastic([0.0; 2]))];
     let lossy = Bsdf::SeparableGgx(lossy_plastic(SeparableGgx::new([0.0; 2]), true));
     let smooth = [white_plastic([0.0; 2]), lossy, glass([0.0; 2]), gold([0.0; 2])];
-    let mut mirrors = 0;
+    let mut mixed = 0;
     for bsdf in smooth.into_iter().chain(layered).chain(rough_bsdfs().into_iter().map(|(_, bsdf)| bsdf)) {
-        if !bsdf.mirrors_beside_others() {
+        if !bsdf.has_mixed_specular_reflection() {
             continue;
         }
-        mirrors += 1;
+        mixed += 1;
         for cos in [1.0, 0.6, 0.1, -0.3, -0.9] {
             let wo = direction(cos, 0.2);
             let reflected =
@@ -92,5 +92,5 @@ fn the_first_lobe_is_the_mirror_reflection() {
             assert!((mean - known).map(f32::abs).max_channel() < 1.0 / STEPS as f32, "{bsdf:?} {mean:?} {known:?}");
         }
     }
-    assert_eq!(mirrors, 3);
+    assert_eq!(mixed, 3);
 }

@@ -25,8 +25,8 @@ pub(super) mod vertex_flags {
     pub const MEDIUM: u32 = 8;
     /// No shadow ray from here reaches a light.
     pub const ENCLOSED: u32 = 16;
-    /// Mirror reflection is one of several lobes.
-    pub const MIRRORS: u32 = 32;
+    /// Specular reflection is one of several lobes.
+    pub const MIXED_SPECULAR: u32 = 32;
     /// Where no light is sampled.
     pub const UNSAMPLED: u32 = DELTA | MISS | ENCLOSED;
 }
@@ -218,7 +218,7 @@ pub(super) struct Vertices {
     /// For the directions of `light_samples`.
     pub light_evals: EvalRows,
     pub direct: DirectRows,
-    /// Whether the light of `direct` leaves by mirror reflection.
+    /// Whether the light of `direct` leaves by specular reflection.
     pub is_direct_specular: bool,
     pub scatter: ScatterRows,
     /// Paths of the block that leave the scene.

@@ -34,7 +34,7 @@ pub(super) struct ContinuationRecorder {
     unoccluded: u64,
     /// The shadow rays of the wave that are towards the first lights of first vertices.
     first_lights: Vec<Range<usize>>,
-    /// Those along mirror reflections.
+    /// Those along specular reflections.
     specular: Vec<Range<usize>>,
     /// What they bring less what those towards the second lights bring, by sample.
     light_differences: Vec<f32>,
@@ -83,7 +83,7 @@ impl ContinuationRecorder {
         }
     }
 
-    /// These shadow rays of the wave, all after those of calls before, are along mirror reflections of first vertices.
+    /// These shadow rays of the wave, all after those of calls before, are specular reflections at first vertices.
     pub fn mark_specular(&mut self, rays: Range<usize>) {
         if self.is_enabled {
             self.specular.push(rays);

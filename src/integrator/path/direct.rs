@@ -58,17 +58,17 @@ fn sample_once(context: &Context, regions: Option<&Regions>, wave: &mut Wave, bl
         guided.mix_light_pdfs(regions, vertices);
     }
     let mis = context.config.strategy == Strategy::Mis;
-    let weighting = Weighting { mis, light_samples: context.light_samples() as f32, shadowed: true };
-    illuminate_all(context, vertices, weighting);
+    let weighting = Weighting { mis, light_samples: context.light_samples() as f32, darkens_bumps: true };
+    weigh(context, vertices, weighting);
     super::connection_mis::reweigh_light_samples(context, wave);
-    finish(context, wave, block);
+    finish_shadow_rays(context, wave, block);
 }
 
-/// Direct light of light samples for which the BSDFs have been evaluated.
-pub(super) fn illuminate_all(context: &Context, vertices: &mut Vertices, weighting: Weighting) {
+/// Weighs light samples for which the BSDFs have been evaluated, and finds the shadow rays.
+pub(super) fn weigh(context: &Context, vertices: &mut Vertices, weighting: Weighting) {
     let Vertices { count, rows, points, light_samples: lights, light_evals: evals, direct, .. } = vertices;
     let count = *count;
-    if weighting.shadowed && context.scene.features.normal_perturbations {
+    if weighting.darkens_bumps && context.scene.features.normal_perturbations {
         vectorize!(illuminate::<true>(rows, points, lights, evals, direct, weighting, count));
     } else {
         vectorize!(illuminate::<false>(rows, points, lights, evals, direct, weighting, count));
@@ -76,7 +76,7 @@ pub(super) fn illuminate_all(context: &Context, vertices: &mut Vertices, weighti
 }
 
 /// Russian roulette of a block's shadow rays, and what else may keep light from arriving.
-pub(super) fn finish(context: &Context, wave: &mut Wave, block: usize) {
+pub(super) fn finish_shadow_rays(context: &Context, wave: &mut Wave, block: usize) {
     if let Some(grid) = context.pass.continuations {
         roulette(grid, &mut wave.vertices);
     }
@@ -130,8 +130,8 @@ pub(super) struct Weighting {
     pub mis: bool,
     /// How many each vertex has.
     pub light_samples: f32,
-    /// Whether normal and bump maps shadow.
-    pub shadowed: bool,
+    /// Whether light grazing a normal or bump map is darkened.
+    pub darkens_bumps: bool,
 }
 
 #[inline(always)]

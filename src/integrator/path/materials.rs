@@ -2,14 +2,14 @@
 
 use super::Context;
 use super::block::{VertexRows, Vertices, vertex_flags};
-use super::wave::{Wave, path_flags};
+use super::wave::{BsdfScratch, Wave, path_flags};
 use crate::bsdf::{Bsdf, BsdfFlags, BsdfQueryRows, Lambert};
 use crate::color::Rgb;
 use crate::id::{MediumId, ShapeId};
 use crate::integrator::World;
 use crate::material::Material;
 use crate::math::compact::sort_lanes;
-use crate::math::rows::{BATCH, Row};
+use crate::math::rows::{BATCH, Row, Vec3Rows};
 use crate::scene::Scene;
 use crate::texture::Footprint;
 
@@ -66,6 +66,30 @@ impl BsdfTable {
                 queries.set_parameters(i, bsdf);
             }
         }
+    }
+
+    /// Samples the one BSDF of a group of vertices with these numbers for the lobe and the direction; false for diffuse
+    /// surfaces.
+    pub fn sample_group(
+        &self,
+        scene: &Scene,
+        wo: &Vec3Rows,
+        lanes: &[u8],
+        u: impl Fn(usize) -> [f32; 3],
+        BsdfScratch { queries, samples, .. }: &mut BsdfScratch,
+    ) -> bool {
+        let Some(bsdf) = self.get(scene, usize::from(lanes[0])) else { return false };
+        let varies = self.varies(usize::from(lanes[0]));
+        for (i, &lane) in lanes.iter().enumerate() {
+            let lane = usize::from(lane);
+            queries.wo.set(i, wo.get(lane));
+            [queries.u_lobe[i], queries.u[i], queries.v[i]] = u(lane);
+        }
+        if varies {
+            self.set_parameters(scene, lanes, queries);
+        }
+        bsdf.sample_rows(queries, varies, lanes.len(), samples);
+        true
     }
 
     fn set_made(&mut self, lane: usize, bsdf: Bsdf) {
@@ -191,8 +215,8 @@ fn flags(bsdf: &Bsdf) -> u32 {
     let lobes = bsdf.flags();
     let delta = if lobes.is_delta() { vertex_flags::DELTA } else { 0 };
     let transmits = if lobes.transmits() { vertex_flags::TRANSMITS } else { 0 };
-    let has_mirror = lobes.contains(BsdfFlags::SPECULAR) && bsdf.mirrors_beside_others();
-    delta | transmits | if has_mirror { vertex_flags::MIRRORS } else { 0 }
+    let is_mixed = lobes.contains(BsdfFlags::SPECULAR) && bsdf.has_mixed_specular_reflection();
+    delta | transmits | if is_mixed { vertex_flags::MIXED_SPECULAR } else { 0 }
 }
 
 /// Sorts the vertices that are not diffuse by their groups.

@@ -24,7 +24,7 @@ mod miss;
 mod photons;
 mod radiance;
 mod scatter;
-mod specular_light;
+mod specular_direct;
 mod subsurface;
 mod surface_aovs;
 mod terminator;
@@ -91,7 +91,7 @@ struct Context<'a> {
     /// Whether paths end at this vertex.
     is_last: bool,
     compensation: MisCompensation,
-    /// The emitters whose mirror reflections are added, if that is done at all.
+    /// The emitters whose specular reflections are added, if that is done at all.
     emitter_prims: Option<&'a EmitterPrims>,
 }
 
@@ -99,7 +99,7 @@ impl<'a> Context<'a> {
     /// At the start of a wave.
     fn new(config: &'a PathIntegrator, pass: &'a PassContext<'a>) -> Self {
         let (world, compensation) = (pass.world, config.strategy.compensation());
-        let emitter_prims = specular_light::emitters(config, pass);
+        let emitter_prims = specular_direct::emitters(config, pass);
         Self { config, pass, world, scene: world.scene, bounce: 0, is_last: false, compensation, emitter_prims }
     }
 
@@ -270,7 +270,7 @@ impl PathIntegrator {
                     connection_mis::arrive(wave, block);
                     connections::sample(context, wave, block);
                 }
-                specular_light::add(context, wave, block);
+                specular_direct::add(context, wave, block);
                 direct::sample(context, regions.as_ref(), wave, block);
                 caustics::gather(context, wave, block, out);
                 scatter::sample(context, regions.as_ref(), wave, block);

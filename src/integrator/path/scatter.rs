@@ -4,7 +4,7 @@ use super::Context;
 use super::block::{PointRows, ScatterRows, VertexRows, Vertices, spawn, vertex_flags};
 use super::direct::{can_be_below, shadowing};
 use super::guided::Regions;
-use super::specular_light;
+use super::specular_direct;
 use super::terminator;
 use super::wave::{BsdfScratch, Wave, path_flags};
 use crate::bsdf::Lambert;
@@ -38,7 +38,7 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
     let rule = SpawnRule {
         survival: context.config.roulette.rule(context.bounce, continuations.is_some()),
         no_lights: context.scene.lights.is_empty(),
-        adds_reflections: specular_light::is_added(context),
+        adds_reflections: specular_direct::is_enabled(context),
     };
     if context.scene.features.normal_perturbations {
         vectorize!(spawn_rays::<true>(rows, points, scatter, u_bsdf, rule, count));
@@ -67,20 +67,15 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
 /// Samples the BSDFs that are not diffuse.
 fn sample_non_diffuse(context: &Context, vertices: &mut Vertices, rows: &mut BsdfScratch) {
     let Vertices { rows: vertex, scatter, non_diffuse, bsdfs, u_bsdf, .. } = vertices;
-    let BsdfScratch { queries, samples, .. } = rows;
     for lanes in bsdfs.groups(non_diffuse) {
-        let Some(bsdf) = bsdfs.get(context.scene, usize::from(lanes[0])) else { continue };
-        let varies = bsdfs.varies(usize::from(lanes[0]));
-        for (i, &lane) in lanes.iter().enumerate() {
-            let lane = usize::from(lane);
-            let u = u_bsdf.of(lane);
-            queries.wo.set(i, vertex.wo.get(lane));
-            (queries.u_lobe[i], queries.u[i], queries.v[i]) = (u[0], u[1], u[2]);
+        let u = |lane: usize| {
+            let [u_lobe, u, v, _] = u_bsdf.of(lane);
+            [u_lobe, u, v]
+        };
+        if !bsdfs.sample_group(context.scene, &vertex.wo, lanes, u, rows) {
+            continue;
         }
-        if varies {
-            bsdfs.set_parameters(context.scene, lanes, queries);
-        }
-        bsdf.sample_rows(queries, varies, lanes.len(), samples);
+        let samples = &rows.samples;
         for (i, &lane) in lanes.iter().enumerate() {
             let lane = usize::from(lane);
             scatter.wi.set(lane, samples.wi.get(i));
@@ -115,7 +110,7 @@ fn sample_diffuse(rows: &VertexRows, scatter: &mut ScatterRows, u: &SampleRows, 
 struct SpawnRule {
     survival: SurvivalRule,
     no_lights: bool,
-    /// Whether the mirror reflections of emitters have been added.
+    /// Whether the specular reflections of emitters have been added.
     adds_reflections: bool,
 }
 
@@ -157,7 +152,7 @@ fn spawn_rays<const PERTURBED: bool>(
         let specular = if is_unsampled { path_flags::SPECULAR } else { 0 };
         let non_specular =
             if is_delta { rows.path_flags[i] & path_flags::ANY_NON_SPECULAR } else { path_flags::ANY_NON_SPECULAR };
-        let is_added = is_delta & rule.adds_reflections & (rows.flags[i] & vertex_flags::MIRRORS != 0);
+        let is_added = is_delta & rule.adds_reflections & (rows.flags[i] & vertex_flags::MIXED_SPECULAR != 0);
         let added = if is_added { path_flags::EMISSION_ADDED } else { 0 };
         scatter.path_flags[i] = specular | non_specular | added;
         scatter.status[i] = spawn::status(goes_on & test.agrees(), goes_on & can_be_below(rows, test, i));

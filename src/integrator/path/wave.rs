@@ -10,7 +10,7 @@ use super::light_aovs::{LightAovs, PathMove};
 use super::light_paths::LightPathState;
 use super::miss::MissScratch;
 use super::photons::PhotonState;
-use super::specular_light::SpecularRows;
+use super::specular_direct::SpecularRows;
 use super::terminator::TerminatorRays;
 use super::{Context, dimensions};
 use crate::accel::HitRows;
