@@ -84,7 +84,7 @@ impl CausticPass {
         });
         // Slower than the variance falls, so that both vanish (Knaus and Zwicker 2011, with alpha = 2/3).
         let radius = self.radius * ((epoch + 1) as f32).powf(-1.0 / 6.0);
-        self.map = Some((epoch, PhotonMap::new(&photons, self.traced, radius)));
+        self.map = Some((epoch, PhotonMap::new(photons, self.traced, radius)));
         counts
     }
 }

@@ -1,6 +1,7 @@
 //! Photons, found by place.
 
 use std::f32::consts::PI;
+use std::ops::Range;
 
 use rayon::prelude::*;
 
@@ -8,7 +9,6 @@ use crate::color::Rgb;
 use crate::id::LightId;
 use crate::math::Vec3;
 use crate::math::float::floor;
-use crate::math::random::hash64;
 
 /// Light that arrives at a surface after one delta lobe or more.
 #[derive(Clone, Copy, Debug)]
@@ -30,65 +30,53 @@ pub struct Photon {
     pub scatterings: u32,
 }
 
-/// Photons in the cells of a grid. Blocks of 4 x 4 x 4 cells that hold photons are in a hash table.
+/// Photons by the cells of a grid from which they can be gathered, each in all of them. Cells share buckets by a hash:
+/// the distance decides what is gathered.
 #[derive(Debug)]
 pub struct PhotonMap {
-    /// By block and cell.
     photons: Vec<Photon>,
-    /// The same photons' points, apart from what only those that are gathered need.
-    points: Vec<Vec3>,
-    /// By cell that holds photons, its first one, and the number of photons.
+    /// By bucket.
+    references: Vec<Reference>,
+    /// By bucket, its first reference; one more than there are buckets, whose number is a power of two.
     starts: Vec<u32>,
-    /// A hash table with linear probing; at most half of it is in use.
-    table: Vec<Block>,
     radius: f32,
     traced: u32,
 }
 
-/// 4 x 4 x 4 cells.
-#[derive(Clone, Copy, Debug, Default)]
-struct Block {
-    place: [i32; 3],
-    /// Index of its first cell in the starts.
-    first: u32,
-    /// A bit for each cell that holds photons; 0 for an entry that is not in use.
-    cells: u64,
+/// A photon in a bucket, with its point.
+#[derive(Clone, Copy, Debug)]
+struct Reference {
+    p: Vec3,
+    photon: u32,
 }
+
+/// The width of a cell over the radius.
+const CELL_WIDTH: f32 = 2.0;
+
+/// References of a photon, about.
+const REFERENCES: usize = 8;
 
 impl PhotonMap {
     /// The photons that arrived of `traced` ones, to be gathered within a positive `radius`.
-    pub fn new(photons: &[Photon], traced: u32, radius: f32) -> Self {
-        let mut map =
-            Self { photons: Vec::new(), points: Vec::new(), starts: Vec::new(), table: Vec::new(), radius, traced };
-        let key = |(i, photon): (usize, &Photon)| {
-            let cell = map.cell(photon.p);
-            (block_of(cell), bit(cell), i as u32)
-        };
-        let mut order: Vec<_> = photons.par_iter().enumerate().map(key).collect();
-        order.par_sort_unstable();
-        let mut blocks: Vec<Block> = Vec::new();
-        let mut previous = None;
-        for (start, &(place, bit, _)) in order.iter().enumerate() {
-            if previous == Some((place, bit)) {
-                continue;
-            }
-            if previous.is_none_or(|(previous, _)| previous != place) {
-                blocks.push(Block { place, first: map.starts.len() as u32, cells: 0 });
-            }
-            if let Some(block) = blocks.last_mut() {
-                block.cells |= 1 << bit;
-            }
-            map.starts.push(start as u32);
-            previous = Some((place, bit));
+    pub fn new(photons: Vec<Photon>, traced: u32, radius: f32) -> Self {
+        let buckets = (REFERENCES * photons.len()).next_power_of_two();
+        let mut map = Self { photons, references: Vec::new(), starts: vec![0; buckets + 1], radius, traced };
+        let mut keys: Vec<_> = map
+            .photons
+            .par_iter()
+            .enumerate()
+            .flat_map_iter(|(i, photon)| {
+                map.buckets_of(photon).into_iter().map(move |bucket| (bucket as u32, i as u32))
+            })
+            .collect();
+        keys.par_sort_unstable();
+        for &(bucket, _) in &keys {
+            map.starts[bucket as usize + 1] += 1;
         }
-        map.starts.push(order.len() as u32);
-        map.photons = order.iter().map(|&(_, _, i)| photons[i as usize]).collect();
-        map.points = map.photons.iter().map(|photon| photon.p).collect();
-        map.table = vec![Block::default(); (2 * blocks.len()).next_power_of_two()];
-        for block in blocks {
-            let free = map.entry(block.place);
-            map.table[free] = block;
+        for bucket in 0..buckets {
+            map.starts[bucket + 1] += map.starts[bucket];
         }
+        map.references = keys.iter().map(|&(_, i)| Reference { p: map.photons[i as usize].p, photon: i }).collect();
         map
     }
 
@@ -103,74 +91,57 @@ impl PhotonMap {
         self.traced as f32 * PI * self.radius * self.radius
     }
 
-    /// Visits the photons around a point of a surface with the unit geometric normal `n`.
+    /// The references of photons that may be near a point.
     #[inline]
-    pub fn for_each_near(&self, p: Vec3, n: Vec3, mut visit: impl FnMut(&Photon)) {
-        let ([x0, y0, z0], [x1, y1, z1]) = (self.cell(p - self.radius), self.cell(p + self.radius));
-        let mut block = Block::default();
-        // What `block` was found for.
-        let mut found = None;
-        for z in z0..=z1 {
-            for y in y0..=y1 {
-                for x in x0..=x1 {
-                    let place = block_of([x, y, z]);
-                    if found != Some(place) {
-                        (block, found) = (self.table[self.entry(place)], Some(place));
-                    }
-                    let bit = bit([x, y, z]);
-                    if block.cells >> bit & 1 != 0 {
-                        let cell = block.first + (block.cells & ((1 << bit) - 1)).count_ones();
-                        self.visit_cell(cell as usize, p, n, &mut visit);
-                    }
+    pub fn candidates(&self, p: Vec3) -> Range<u32> {
+        let bucket = self.bucket(self.cell(p));
+        self.starts[bucket]..self.starts[bucket + 1]
+    }
+
+    /// Visits the photons among the candidates of a point that are around it, where a surface has the unit geometric
+    /// normal `n`.
+    #[inline]
+    pub fn for_each_near(&self, candidates: Range<u32>, p: Vec3, n: Vec3, mut visit: impl FnMut(&Photon)) {
+        for reference in &self.references[candidates.start as usize..candidates.end as usize] {
+            let d = reference.p - p;
+            if d.length_squared() < self.radius * self.radius {
+                let photon = &self.photons[reference.photon as usize];
+                // Arrived on a surface that is about the same.
+                if d.dot(n).abs() < 0.5 * self.radius && photon.n.dot(n).abs() > 0.7 {
+                    visit(photon);
                 }
             }
         }
     }
 
-    #[inline]
-    fn visit_cell(&self, cell: usize, p: Vec3, n: Vec3, visit: &mut impl FnMut(&Photon)) {
-        for i in self.starts[cell] as usize..self.starts[cell + 1] as usize {
-            let d = self.points[i] - p;
-            if d.length_squared() < self.radius * self.radius && self.is_on_surface(i, d, n) {
-                visit(&self.photons[i]);
+    /// The buckets of the cells from which a photon can be gathered, each once.
+    fn buckets_of(&self, photon: &Photon) -> Vec<usize> {
+        let ([x0, y0, z0], [x1, y1, z1]) = (self.cell(photon.p - self.radius), self.cell(photon.p + self.radius));
+        let mut buckets = Vec::with_capacity(REFERENCES);
+        for z in z0..=z1 {
+            for y in y0..=y1 {
+                for x in x0..=x1 {
+                    let bucket = self.bucket([x, y, z]);
+                    if !buckets.contains(&bucket) {
+                        buckets.push(bucket);
+                    }
+                }
             }
         }
+        buckets
     }
 
-    /// Whether a photon at a distance `d` has arrived on a surface that is about the same.
-    #[inline]
-    fn is_on_surface(&self, i: usize, d: Vec3, n: Vec3) -> bool {
-        d.dot(n).abs() < 0.5 * self.radius && self.photons[i].n.dot(n).abs() > 0.7
-    }
-
-    /// Cells are as wide as what is gathered.
     #[inline]
     fn cell(&self, p: Vec3) -> [i32; 3] {
-        let scaled = p * (0.5 / self.radius);
+        let scaled = p * (1.0 / (CELL_WIDTH * self.radius));
         [floor(scaled.x) as i32, floor(scaled.y) as i32, floor(scaled.z) as i32]
     }
 
-    /// The entry of a block's place, in use or not.
     #[inline]
-    fn entry(&self, place: [i32; 3]) -> usize {
-        let [x, y, z] = place;
-        let mask = self.table.len() - 1;
-        let mut entry = hash64(hash64(u64::from(x as u32) << 32 | u64::from(y as u32)) ^ z as u64) as usize & mask;
-        while self.table[entry].cells != 0 && self.table[entry].place != place {
-            entry = (entry + 1) & mask;
-        }
-        entry
+    fn bucket(&self, [x, y, z]: [i32; 3]) -> usize {
+        let mixed = (x as u32).wrapping_mul(0x9e37_79b1)
+            ^ (y as u32).wrapping_mul(0x85eb_ca77)
+            ^ (z as u32).wrapping_mul(0xc2b2_ae3d);
+        (u64::from(mixed).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize & (self.starts.len() - 2)
     }
-}
-
-/// The block that a cell lies in.
-#[inline]
-fn block_of([x, y, z]: [i32; 3]) -> [i32; 3] {
-    [x >> 2, y >> 2, z >> 2]
-}
-
-/// A cell's bit in its block.
-#[inline]
-fn bit([x, y, z]: [i32; 3]) -> u32 {
-    ((z & 3) << 4 | (y & 3) << 2 | (x & 3)) as u32
 }

@@ -67,27 +67,41 @@ pub(super) fn gather(context: &Context, wave: &mut Wave, block: usize, out: &mut
     let Some(Caustics { photons, .. }) = context.pass.caustics else { return };
     let Wave { vertices, light_aovs, .. } = &*wave;
     let area = photons.gathered_area();
+    let mut candidates = [(0, 0); BATCH];
+    for (lane, candidates) in candidates.iter_mut().enumerate().take(vertices.count) {
+        let found = photons.candidates(vertices.points.p.get(lane).as_vec3());
+        *candidates = (found.start, found.end);
+    }
     for lane in 0..vertices.count.min(BATCH) {
         let rows = &vertices.rows;
-        if rows.flags[lane] & (vertex_flags::DELTA | vertex_flags::MISS) != 0 {
+        if candidates[lane].0 == candidates[lane].1
+            || rows.flags[lane] & (vertex_flags::DELTA | vertex_flags::MISS) != 0
+        {
             continue;
         }
         let (throughput, slot) = (rows.throughput.get(lane), rows.slot[lane]);
-        photons.for_each_near(vertices.points.p.get(lane).as_vec3(), rows.n_g.get(lane), |photon| {
-            let is_short = context.bounce + photon.scatterings + 2 <= context.config.max_depth;
-            let Some(scattered) = scattered(context, vertices, lane, photon, area).filter(|_| is_short) else { return };
-            let light = context.config.clamped(throughput * scattered, context.bounce + 1 + photon.scatterings);
-            out.add(slot, light);
-            if context.config.needs_light_aovs() {
-                let event = if context.bounce == 0 && context.config.light_aovs.by_scattering {
-                    let wi = vertices.frame(lane).to_local(photon.wi);
-                    LightEvent::Indirect(vertices.lobes(context.scene, lane, wi))
-                } else {
-                    light_aovs.event(context.bounce + 2, block * BATCH + vertices.path(lane), LightEvent::Emission)
+        photons.for_each_near(
+            candidates[lane].0..candidates[lane].1,
+            vertices.points.p.get(lane).as_vec3(),
+            rows.n_g.get(lane),
+            |photon| {
+                let is_short = context.bounce + photon.scatterings + 2 <= context.config.max_depth;
+                let Some(scattered) = scattered(context, vertices, lane, photon, area).filter(|_| is_short) else {
+                    return;
                 };
-                out.add_to_light_aovs(context, slot, light, event, photon.light);
-            }
-        });
+                let light = context.config.clamped(throughput * scattered, context.bounce + 1 + photon.scatterings);
+                out.add(slot, light);
+                if context.config.needs_light_aovs() {
+                    let event = if context.bounce == 0 && context.config.light_aovs.by_scattering {
+                        let wi = vertices.frame(lane).to_local(photon.wi);
+                        LightEvent::Indirect(vertices.lobes(context.scene, lane, wi))
+                    } else {
+                        light_aovs.event(context.bounce + 2, block * BATCH + vertices.path(lane), LightEvent::Emission)
+                    };
+                    out.add_to_light_aovs(context, slot, light, event, photon.light);
+                }
+            },
+        );
     }
 }
 
