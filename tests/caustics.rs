@@ -86,14 +86,20 @@ fn photons_and_paths_have_the_same_mean() {
     }
 }
 
-/// Two renders differ by twice the variance of one.
-#[test]
-fn photons_lower_the_error_of_a_small_lamp_behind_glass() {
+/// The balls, lit by a lamp so small that paths hardly meet it.
+fn small_lamp() -> Value {
     let mut scene = balls();
     scene["shapes"][2] = json!({
         "type": "sphere", "material": "white", "radius": 0.2, "transform": [{ "translate": [0, 2.5, 0] }],
         "emission": { "radiance": [60, 50, 45] }
     });
+    scene
+}
+
+/// Two renders differ by twice the variance of one.
+#[test]
+fn photons_lower_the_error_of_a_small_lamp_behind_glass() {
+    let mut scene = small_lamp();
     scene["integrator"]["roulette"] = json!("throughput");
     let difference = |caustics| {
         let [a, b] = [1, 2].map(|seed| of_seed(&scene, caustics, seed, 32));
@@ -176,6 +182,58 @@ fn pictures_with_photons_do_not_depend_on_threads_or_accelerators() {
     assert_ne!(first, of_seed(&balls(), CausticsDesc::Paths, 0, 12));
 }
 
+/// The balls within a sphere that emits as much as its wall absorbs, where paths have no noise.
+fn furnace() -> Value {
+    let mut scene = balls();
+    scene["materials"]["white"]["albedo"] = json!(0.5);
+    scene["shapes"] = json!([
+        { "type": "sphere", "material": "mirror", "radius": 0.5 },
+        { "type": "sphere", "radius": 5, "material": "white",
+          "emission": { "radiance": [0.5, 0.5, 0.5], "two_sided": true } }
+    ]);
+    scene["integrator"] = json!({ "type": "path", "max_depth": 3, "rr_depth": 100 });
+    scene
+}
+
+#[test]
+fn a_pilot_decides_where_photons_are_worth_their_time() {
+    for (scene, is_worth_it) in [(small_lamp(), true), (balls(), false), (furnace(), false)] {
+        let of_choice = |caustics, spp| {
+            let bidirectional = Some(if is_worth_it { AutoDesc::Auto } else { AutoDesc::Off });
+            of(&scene, caustics, &Overrides { bidirectional, spp: Some(spp), ..Overrides::default() })
+        };
+        let [auto, photons, paths] =
+            [CausticsDesc::Auto, CausticsDesc::Photons, CausticsDesc::Paths].map(|choice| of_choice(choice, 16));
+        assert!(photons != paths);
+        assert!(auto == if is_worth_it { photons } else { paths }, "{is_worth_it}");
+        // So few samples are not worth a pilot.
+        assert!(of_choice(CausticsDesc::Auto, 15) == of_choice(CausticsDesc::Paths, 15));
+    }
+}
+
+/// What a pilot decides does not change what the picture shows: of lights that paths never meet, no caustics.
+#[test]
+fn a_pilot_adds_no_caustics_of_point_lights() {
+    let sphere = json!({
+        "type": "sphere", "material": "white", "radius": 0.02, "transform": [{ "translate": [1, 1, 0] }],
+        "emission": { "radiance": [2500, 2500, 2500] }
+    });
+    let red = |caustics, lights: Value| {
+        let mut scene = lamp_beside_a_mirror(&sphere);
+        scene["lights"] = lights;
+        let overrides = Overrides { spp: Some(64), bidirectional: Some(AutoDesc::Off), ..Overrides::default() };
+        let image = of(&scene, caustics, &overrides);
+        (0..32 * 32).map(|i| f64::from(image.pixel(LayerKind::Color, i % 32, i / 32).unwrap()[0])).sum::<f64>()
+    };
+    let point = || json!([{ "type": "point", "position": [1.5, 1, 0], "intensity": [3, 3, 3] }]);
+    let lamp = red(CausticsDesc::Photons, json!([]));
+    assert_eq!(red(CausticsDesc::Auto, json!([])), lamp);
+    let [direct, mirrored] = [1.5, -1.5].map(|x| 3.0 * floor_radiance(x) * 1024.0);
+    let (auto, photons) = (red(CausticsDesc::Auto, point()), red(CausticsDesc::Photons, point()));
+    let (added, caustic) = ((auto - lamp) / direct, (photons - auto) / mirrored);
+    assert!((added - 1.0).abs() < 0.01 && (caustic - 1.0).abs() < 0.1, "{added} {caustic}");
+}
+
 /// Without mirrors and glass there are no photons.
 #[test]
 fn scenes_without_mirrors_and_glass_stay_what_they_are() {
@@ -188,6 +246,12 @@ fn renders_with_photons_are_resumed_split_and_replayed() {
     let overrides =
         Overrides { caustics: Some(CausticsDesc::Photons), spp: Some(21), threads: Some(2), ..Overrides::default() };
     assert_resumed_split_and_replayed(&balls(), &overrides);
+}
+
+#[test]
+fn renders_are_resumed_split_and_replayed_after_a_pilot() {
+    let overrides = Overrides { spp: Some(21), threads: Some(2), ..Overrides::default() };
+    assert_resumed_split_and_replayed(&small_lamp(), &overrides);
 }
 
 #[test]
@@ -205,6 +269,9 @@ fn what_photons_cannot_do_is_refused() {
         (Overrides { guiding: Some(AutoDesc::On), ..on.clone() }, "`guiding`"),
         (Overrides { regularize: Some(0.1), ..on.clone() }, "`regularize`"),
     ] {
+        let desc = serde_json::from_value(balls()).unwrap();
+        let auto = Overrides { caustics: Some(CausticsDesc::Auto), ..overrides.clone() };
+        assert!(render::Settings::new(&desc, &auto).is_ok(), "{option}");
         let message = refusal(&balls(), &overrides);
         assert!(message.starts_with("`caustics` photons") && message.contains(option), "{message}");
     }

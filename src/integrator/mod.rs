@@ -263,6 +263,17 @@ pub struct PhotonRange {
     pub indices: Range<u32>,
 }
 
+/// What a sample with a method shows of the variance with and without it, by channel.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PilotMoments {
+    /// Radiance that the sample would have without the method, less that which it has.
+    pub without: [f64; 3],
+    /// How much larger the variance without the method is than samples show it, on average.
+    pub excess: [f64; 3],
+    /// What samples of a pixel do not show of the variance with it, since they have it in common.
+    pub shared: [f64; 3],
+}
+
 /// The buffers of one thread, reused from batch to batch.
 #[derive(Default)]
 pub struct Workspace {
@@ -279,10 +290,9 @@ impl Workspace {
         self.paths.second_moments(&self.out)
     }
 
-    /// How much larger the second moments of the last batch's samples would be without connections to light paths, by
-    /// channel, if these asked for it.
-    pub fn excess_moments(&self) -> &[[f64; 3]] {
-        self.paths.excess_moments()
+    /// Those of the last batch's samples, if light paths or photons asked for them.
+    pub fn pilot_moments(&self) -> &[PilotMoments] {
+        self.paths.pilot_moments()
     }
 }
 

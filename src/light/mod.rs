@@ -129,6 +129,15 @@ impl LightSample {
 }
 
 impl Light {
+    /// Whether no ray ever meets this light.
+    pub fn is_delta(&self) -> bool {
+        match self {
+            Self::Directional(light) => light.is_delta(),
+            Self::Area(_) | Self::Environment(_) => false,
+            Self::Point(_) | Self::Spot(_) | Self::Projector(_) | Self::Ies(_) => true,
+        }
+    }
+
     /// Whether rays that leave the scene can see this light.
     pub fn is_visible_at_infinity(&self) -> bool {
         match self {

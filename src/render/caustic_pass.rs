@@ -3,9 +3,9 @@
 use std::ops::RangeInclusive;
 use std::sync::Mutex;
 
-use super::Settings;
 use super::epoch::trace_parts;
 use super::tile_renderer::TileWorkspace;
+use super::{LightTracing, Settings};
 use crate::accel::Accelerator;
 use crate::integrator::{CausticCasters, Caustics, EPOCH, Integrator, PassContext, PhotonMap, PhotonRange, RayCounts};
 use crate::math::Vec2;
@@ -15,7 +15,7 @@ use crate::scene::Scene;
 /// Photons traced in an epoch, by pixel of the picture.
 const PHOTONS_PER_PIXEL: f64 = 0.25;
 
-/// The fewest and the most photons traced in an epoch; the most take 300 MB.
+/// The fewest and the most photons traced in an epoch; the most take 600 MB.
 const PHOTONS: RangeInclusive<f64> = 16_384.0..=4e6;
 
 /// Photons are gathered within this many widths of a pixel at the median distance of what the camera sees, at first.
@@ -30,7 +30,10 @@ const PROBES: u32 = 48;
 /// Traces photons and keeps those of one epoch.
 pub(super) struct CausticPass {
     casters: CausticCasters,
+    /// In an epoch.
     traced: u32,
+    /// Whether they are those of the pilot.
+    is_pilot: bool,
     /// In the first epoch.
     radius: f32,
     /// The epoch, and its photons.
@@ -38,30 +41,46 @@ pub(super) struct CausticPass {
 }
 
 impl CausticPass {
-    /// For a scene; `None` if nothing in it can cast caustics, or if the camera sees nothing.
+    /// For a scene; `None` if no photons are wanted, if nothing in it can cast caustics, or if the camera sees nothing.
     pub fn new(scene: &Scene, accel: &dyn Accelerator, settings: &Settings) -> Option<Self> {
-        if scene.features.participating_media {
-            tracing::warn!("photons are not traced through media that scatter or emit light");
+        if !settings.may_trace(LightTracing::Photons) {
             return None;
         }
-        if scene.features.subsurface {
-            tracing::warn!("photons are not traced below surfaces");
+        let unsupported = [
+            (scene.features.participating_media, "through media that scatter or emit light"),
+            (scene.features.subsurface, "below surfaces"),
+        ];
+        if let Some((_, place)) = unsupported.into_iter().find(|(is_there, _)| *is_there) {
+            if settings.light_tracing().is_some() {
+                tracing::warn!("photons are not traced {place}");
+            }
             return None;
         }
-        let casters = CausticCasters::new(scene)?;
+        let casters = CausticCasters::new(scene, settings.traces_delta_lights())?;
         let [width, height] = settings.size.map(f64::from);
         let traced = (PHOTONS_PER_PIXEL * width * height).clamp(*PHOTONS.start(), *PHOTONS.end()) as u32;
         let bounds = accel.bounds();
         let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
         let radius = RADIUS_IN_PIXELS * median_pixel_width(scene, accel, settings.size)?;
         let radius = radius.max(LEAST_RADIUS * farthest);
-        Some(Self { casters, traced, radius, map: None })
+        Some(Self { casters, traced, is_pilot: false, radius, map: None })
+    }
+
+    /// For a pilot, or for the picture: fewer photons that are gathered within a larger radius, as many on average.
+    #[must_use]
+    pub fn for_pilot(self, is_pilot: bool) -> Self {
+        Self { is_pilot, map: None, ..self }
+    }
+
+    /// Photons of an epoch of the picture over those of the pilot.
+    pub fn per_pilot_photon(&self) -> f64 {
+        f64::from(self.traced) / PHOTONS.start()
     }
 
     /// What paths read, if there are photons.
     pub fn caustics(&self) -> Option<Caustics<'_>> {
         let (_, photons) = self.map.as_ref().filter(|(_, photons)| !photons.is_empty())?;
-        Some(Caustics { casters: &self.casters, photons })
+        Some(Caustics { casters: &self.casters, photons, has_moments: self.is_pilot })
     }
 
     /// Traces the photons of a sample's epoch, unless they are there; the result is the rays traced.
@@ -79,12 +98,14 @@ impl CausticPass {
         }
         // Beyond all pixels.
         let seed: PixelSeed = sampler.pixel(epoch, u32::MAX);
-        let (photons, counts) = trace_parts(self.traced, workspaces, |indices, workspace, photons| {
+        let traced = if self.is_pilot { *PHOTONS.start() as u32 } else { self.traced };
+        let (photons, counts) = trace_parts(traced, workspaces, |indices, workspace, photons| {
             integrator.trace_photons(pass, &self.casters, &PhotonRange { seed, indices }, workspace, photons);
         });
         // Slower than the variance falls, so that both vanish (Knaus and Zwicker 2011, with alpha = 2/3).
-        let radius = self.radius * ((epoch + 1) as f32).powf(-1.0 / 6.0);
-        self.map = Some((epoch, PhotonMap::new(photons, self.traced, radius)));
+        let factor =
+            if self.is_pilot { self.per_pilot_photon().sqrt() as f32 } else { ((epoch + 1) as f32).powf(-1.0 / 6.0) };
+        self.map = Some((epoch, PhotonMap::new(photons, traced, self.radius * factor)));
         counts
     }
 }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::planner::{Pass, PassSize};
 use super::settings::refused;
 use super::tile_renderer::{TileRenderer, TileWorkspace};
-use super::{Checkpoints, Progress, RenderState, Settings, Stats, check_resumable};
+use super::{Checkpoints, LightTracing, Progress, RenderState, Settings, Stats, check_resumable};
 use crate::accel::Accelerator;
 use crate::error::{Error, Result};
 use crate::film::FilmTile;
@@ -100,11 +100,11 @@ impl Driver<'_> {
         state.start(self.session);
         // Its rays are of no sample: a resumed render and a shard trace it again.
         // Pictures that were begun without a decision go on as they are.
-        let is_bidirectional = state.bidirectional.or((state.done > 0).then_some(false));
-        self.pool.install(|| self.renderer.prepare(&self.workspaces, is_bidirectional));
+        let known = state.light_tracing.or((state.done > 0).then_some(LightTracing::Off));
+        self.pool.install(|| self.renderer.prepare(&self.workspaces, known));
         // A pilot that was cancelled has decided nothing.
         if !self.renderer.context.is_cancelled() {
-            state.set_bidirectional(self.renderer.is_bidirectional());
+            state.set_light_tracing(self.renderer.light_tracing());
         }
         let all = state.film.tiles().len();
         let mut size =
@@ -144,7 +144,7 @@ impl Driver<'_> {
         }
         stats.estimated_error = state.estimated_error();
         stats.samples = state.samples();
-        stats.bidirectional = state.bidirectional == Some(true);
+        stats.light_tracing = state.light_tracing.unwrap_or_default();
         self.finish(state);
         stats
     }

@@ -6,7 +6,7 @@ use super::pilot_samples::{Estimate, PilotSamples};
 use super::tile_renderer::{TileRenderer, TileWorkspace};
 use crate::film::Crop;
 use crate::guiding::Guide;
-use crate::integrator::Guidance;
+use crate::integrator::{Guidance, PilotMoments, SecondMoments};
 
 /// Samples of a pilot pixel with and without the guide; the latter give the brightness alone.
 const SAMPLES: u32 = 16;
@@ -44,14 +44,15 @@ impl GuidingPilot<'_> {
 
     fn trace(&self, guide: Option<&Guide>, samples: u32) -> PilotSamples {
         let guidance = Guidance { guide, learner: None, has_moments: guide.is_some() };
-        let excess = |workspace: &TileWorkspace| {
+        let moments = |workspace: &TileWorkspace| {
             let moments = if guide.is_some() { workspace.integrator.second_moments() } else { Vec::new() };
-            moments.iter().map(|moments| [0, 1, 2].map(|k| moments.unguided[k] - moments.guided[k])).collect()
+            let excess = |moments: &SecondMoments| [0, 1, 2].map(|k| moments.unguided[k] - moments.guided[k]);
+            moments.iter().map(|of| PilotMoments { excess: excess(of), ..PilotMoments::default() }).collect()
         };
         let render = |samples: &mut dyn Iterator<Item = _>, workspace: &mut TileWorkspace| {
             self.renderer.render_samples(samples, guidance, workspace);
         };
-        PilotSamples::trace(self.crop, samples, self.workspaces, render, excess)
+        PilotSamples::trace(self.crop, samples, self.workspaces, render, moments)
     }
 }
 

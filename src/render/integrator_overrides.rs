@@ -99,18 +99,25 @@ fn set_guiding(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Result
 }
 
 fn set_caustics(integrator: &mut IntegratorDesc, overrides: &Overrides) -> Result<()> {
-    if let Some(chosen) = overrides.caustics {
-        let IntegratorDesc::Path { caustics, .. } = integrator else {
-            return Err(refused("caustics", ": only the integrator path traces photons"));
+    let unsupported = unsupported_with_photons(integrator, overrides.guide.is_some(), overrides.target_error.is_some());
+    let IntegratorDesc::Path { caustics, .. } = integrator else {
+        return match overrides.caustics {
+            Some(CausticsDesc::Photons) => {
+                Err(refused("caustics", " photons: only the integrator path traces photons"))
+            }
+            _ => Ok(()),
         };
-        *caustics = chosen;
-    }
-    if !matches!(integrator, IntegratorDesc::Path { caustics: CausticsDesc::Photons, .. }) {
-        return Ok(());
-    }
-    match unsupported_with_epochs(integrator, overrides.guide.is_some(), overrides.target_error.is_some()) {
-        Some(option) => Err(refused("caustics", format!(" photons: unsupported with {option}; give `caustics` paths"))),
-        None => Ok(()),
+    };
+    *caustics = overrides.caustics.unwrap_or(*caustics);
+    match (*caustics, unsupported) {
+        (CausticsDesc::Photons, Some(option)) => {
+            Err(refused("caustics", format!(" photons: unsupported with {option}; give `caustics` paths")))
+        }
+        (CausticsDesc::Auto, Some(_)) => {
+            *caustics = CausticsDesc::Paths;
+            Ok(())
+        }
+        _ => Ok(()),
     }
 }
 
@@ -147,12 +154,16 @@ pub(super) fn unsupported_with_light_paths(
 ) -> Option<&'static str> {
     match integrator {
         IntegratorDesc::Path { caustics: CausticsDesc::Photons, .. } => Some("`caustics` photons"),
-        _ => unsupported_with_epochs(integrator, has_guide, has_target),
+        _ => unsupported_with_photons(integrator, has_guide, has_target),
     }
 }
 
-/// The first option that is unsupported with photons and with light paths.
-fn unsupported_with_epochs(integrator: &IntegratorDesc, has_guide: bool, has_target: bool) -> Option<&'static str> {
+/// The first option that is unsupported with photons.
+pub(super) fn unsupported_with_photons(
+    integrator: &IntegratorDesc,
+    has_guide: bool,
+    has_target: bool,
+) -> Option<&'static str> {
     let IntegratorDesc::Path { strategy, regularize, guiding, .. } = integrator else { return None };
     let options = [
         (*strategy != StrategyDesc::Mis, "`strategy` other than mis"),

@@ -3,9 +3,9 @@
 use std::ops::RangeInclusive;
 use std::sync::Mutex;
 
-use super::Settings;
 use super::epoch::trace_parts;
 use super::tile_renderer::TileWorkspace;
+use super::{LightTracing, Settings};
 use crate::integrator::{EPOCH, Emitters, Integrator, LightPaths, LightVertex, PassContext, PhotonRange, RayCounts};
 use crate::sampling::{PixelSeed, Sampler};
 use crate::scene::Scene;
@@ -19,8 +19,6 @@ const PATHS: RangeInclusive<f64> = 16_384.0..=250_000.0;
 /// Traces light paths and keeps those of one epoch.
 pub(super) struct LightPathPass {
     emitters: Emitters,
-    /// Whether it is still to be decided if paths are connected to them.
-    pub needs_pilot: bool,
     /// Whether they are those of the pilot.
     is_pilot: bool,
     /// Light paths of an epoch.
@@ -30,10 +28,9 @@ pub(super) struct LightPathPass {
 }
 
 impl LightPathPass {
-    /// For a scene; `None` if no light path can start in it.
+    /// For a scene; `None` if no light path can start in it, or if none is wanted.
     pub fn new(scene: &Scene, settings: &Settings) -> Option<Self> {
-        let choice = settings.bidirectional();
-        if choice == Some(false) {
+        if !settings.may_trace(LightTracing::Bidirectional) {
             return None;
         }
         let features = &scene.features;
@@ -43,7 +40,7 @@ impl LightPathPass {
             (features.motion, "motion while the shutter is open"),
         ];
         if let Some((_, what)) = unsupported.into_iter().find(|(is_there, _)| *is_there) {
-            if choice == Some(true) {
+            if settings.light_tracing().is_some() {
                 tracing::warn!("bidirectional path tracing does not support {what}: paths are not connected");
             }
             return None;
@@ -51,13 +48,13 @@ impl LightPathPass {
         let emitters = Emitters::new(scene)?;
         let [width, height] = settings.size.map(f64::from);
         let traced = (PATHS_PER_PIXEL * width * height).clamp(*PATHS.start(), *PATHS.end()) as u32;
-        Some(Self { emitters, needs_pilot: choice.is_none(), is_pilot: false, traced, vertices: None })
+        Some(Self { emitters, is_pilot: false, traced, vertices: None })
     }
 
     /// As many light paths as a pilot needs.
     pub fn for_pilot(&self) -> Self {
         let (emitters, traced) = (self.emitters.clone(), self.pilot_paths());
-        Self { emitters, needs_pilot: false, is_pilot: true, traced, vertices: None }
+        Self { emitters, is_pilot: true, traced, vertices: None }
     }
 
     /// Light paths of an epoch over those of the pilot.

@@ -3,7 +3,6 @@
 //! A batch is one sample index of one tile of the full film's grid, whatever the crop, the threads or the passes; so
 //! every sample can be replayed alone, and any split of the work gives the same picture bit for bit.
 
-mod bidirectional_pilot;
 mod caustic_pass;
 mod driver;
 mod epoch;
@@ -11,6 +10,8 @@ mod exr_overrides;
 mod guiding_pilot;
 mod integrator_overrides;
 mod light_path_pass;
+mod light_tracing;
+mod light_tracing_pilot;
 mod outputs;
 mod overrides;
 mod pilot_samples;
@@ -26,6 +27,7 @@ mod trained_guide;
 
 pub use driver::RenderSession;
 pub use exr_overrides::ExrOverrides;
+pub use light_tracing::LightTracing;
 pub use overrides::Overrides;
 pub use progress::{Progress, Silent};
 pub use provenance::{RenderProvenance, SequenceFrame};
@@ -77,8 +79,8 @@ pub struct Stats {
     pub nan_samples: u64,
     /// The first few of them.
     pub dropped: Vec<DroppedSample>,
-    /// Whether paths were connected to light paths.
-    pub bidirectional: bool,
+    /// What was traced from the lights.
+    pub light_tracing: LightTracing,
     /// Whether a stop was requested before all samples were done.
     pub interrupted: bool,
     /// Whether the time limit ended the render.

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::TILE_SIZE;
 use super::tile_renderer::TileWorkspace;
 use crate::film::Crop;
-use crate::integrator::RayCounts;
+use crate::integrator::{PilotMoments, RayCounts};
 use crate::math::random::hash64;
 
 /// Pixels of a pilot, by pixel of the picture.
@@ -42,16 +42,22 @@ struct PilotPixels {
 struct PilotPixel {
     radiance: [f64; 3],
     square: [f64; 3],
-    /// Second moment without the method, less that with it.
+    /// Of the same samples without the method.
+    radiance_without: [f64; 3],
+    square_without: [f64; 3],
     excess: [f64; 3],
+    shared: [f64; 3],
 }
 
 impl PilotPixel {
-    /// The sum over the channels of the variance of one of so many samples, times these factors.
-    fn weighted_variance(&self, factors: [f64; 3], samples: u32) -> f64 {
-        let variance = |k: usize| (self.square[k] - self.radiance[k] * self.radiance[k]).max(0.0);
-        let sum = (0..3).map(|k| factors[k] * variance(k)).sum::<f64>();
-        sum * f64::from(samples) / f64::from(samples - 1)
+    /// The sums over the channels of the variances of one of so many samples with the method and without it, times
+    /// these factors.
+    fn weighted_variances(&self, factors: [f64; 3], samples: u32) -> [f64; 2] {
+        let samples = f64::from(samples);
+        let shown = |mean: f64, square: f64| (square - mean * mean).max(0.0) * samples / (samples - 1.0);
+        let with = |k: usize| shown(self.radiance[k], self.square[k]) + self.shared[k];
+        let without = |k: usize| shown(self.radiance_without[k], self.square_without[k]) + self.excess[k];
+        [(0..3).map(|k| factors[k] * with(k)).sum(), (0..3).map(|k| factors[k] * without(k)).sum()]
     }
 }
 
@@ -115,14 +121,14 @@ impl PilotPixels {
 }
 
 impl PilotSamples {
-    /// Samples that `render` gives for indices of samples of pixels, at most as many as a tile has pixels. `excess`
-    /// finds the second moments of a batch without the method, less those with it, by sample and channel.
+    /// Samples that `render` gives for indices of samples of pixels, at most as many as a tile has pixels. `moments`
+    /// finds those of a batch by sample; none for samples without the method.
     pub fn trace(
         crop: Crop,
         samples: u32,
         workspaces: &[Mutex<TileWorkspace>],
         render: impl Fn(&mut dyn Iterator<Item = ([u32; 2], u32)>, &mut TileWorkspace) + Sync,
-        excess: impl Fn(&TileWorkspace) -> Vec<[f64; 3]> + Sync,
+        moments: impl Fn(&TileWorkspace) -> Vec<PilotMoments> + Sync,
     ) -> Self {
         let pixels = PilotPixels::new(crop);
         let parts: Vec<(Vec<PilotPixel>, RayCounts)> = pixels
@@ -133,7 +139,7 @@ impl PilotSamples {
                 let mut workspace = workspaces[thread].lock().unwrap_or_else(PoisonError::into_inner);
                 let of_pixel = |&pixel: &[u32; 2]| samples_of_pixel(samples).map(move |i| (pixel, i));
                 render(&mut pixels.iter().flat_map(of_pixel), &mut workspace);
-                let means = means(&workspace, &excess(&workspace), samples);
+                let means = means(&workspace, &moments(&workspace), samples);
                 (means, std::mem::take(&mut workspace.integrator.counts))
             })
             .collect();
@@ -159,7 +165,7 @@ impl PilotSamples {
     pub fn relative_variance(&self) -> f64 {
         let factors = self.pixels.relative_to(|i| self.means[i].radiance);
         let pixels = self.means.iter().zip(factors);
-        pixels.map(|(pixel, factors)| pixel.weighted_variance(factors, self.samples)).sum::<f64>()
+        pixels.map(|(pixel, factors)| pixel.weighted_variances(factors, self.samples)[0]).sum::<f64>()
             / (3 * self.means.len()) as f64
     }
 
@@ -167,32 +173,34 @@ impl PilotSamples {
     /// part of the pixels, those where that differs most, is left out.
     pub fn gain(&self, left_out: f64) -> Option<Estimate> {
         let factors = self.pixels.relative_to(|i| self.means[i].radiance);
-        // Relative variances: that with the method, and how much more it is without.
-        let of_pixel = |(pixel, factors): (&PilotPixel, [f64; 3])| {
-            let excess = (0..3).map(|k| factors[k] * pixel.excess[k]).sum::<f64>();
-            [pixel.weighted_variance(factors, self.samples), excess]
-        };
-        let mut pixels: Vec<[f64; 2]> = self.means.iter().zip(factors).map(of_pixel).collect();
+        let pixels = self.means.iter().zip(factors);
+        let mut pixels: Vec<_> =
+            pixels.map(|(pixel, factors)| pixel.weighted_variances(factors, self.samples)).collect();
         if left_out > 0.0 {
-            pixels.sort_unstable_by(|a, b| a[1].total_cmp(&b[1]));
+            pixels.sort_unstable_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])));
             pixels.truncate((pixels.len() as f64 * (1.0 - left_out)) as usize);
         }
-        Estimate::of_sums(pixels.into_iter(), |[variance, excess]| 1.0 + excess / variance)
+        Estimate::of_sums(pixels.into_iter(), |[with, without]| without / with)
     }
 }
 
 /// The means of the pixels of a batch.
-fn means(batch: &TileWorkspace, excess: &[[f64; 3]], samples: u32) -> Vec<PilotPixel> {
+fn means(batch: &TileWorkspace, moments: &[PilotMoments], samples: u32) -> Vec<PilotPixel> {
     let mean = |first: usize| {
         let mut mean = PilotPixel::default();
         for slot in first..first + samples as usize {
-            let (radiance, excess) = (batch.radiance(slot), excess.get(slot).copied().unwrap_or_default());
+            let (radiance, moments) = (batch.radiance(slot), moments.get(slot).copied().unwrap_or_default());
+            let PilotMoments { without, excess, shared } = moments;
             // What is not finite is dropped, as in pictures.
-            if radiance.iter().chain(&excess).all(|value| value.is_finite()) {
+            if [radiance, without, excess, shared].iter().flatten().all(|value| value.is_finite()) {
                 for (k, value) in radiance.into_iter().enumerate() {
+                    let without = value + without[k];
                     mean.radiance[k] += value / f64::from(samples);
                     mean.square[k] += value * value / f64::from(samples);
+                    mean.radiance_without[k] += without / f64::from(samples);
+                    mean.square_without[k] += without * without / f64::from(samples);
                     mean.excess[k] += excess[k] / f64::from(samples);
+                    mean.shared[k] += shared[k] / f64::from(samples);
                 }
             }
         }
@@ -239,7 +247,14 @@ mod tests {
 
     /// Pixels whose samples are 0 or 2, as often, with this excess.
     fn gain(excess: impl Fn(usize) -> f64) -> Estimate {
-        let pixel = |i| PilotPixel { radiance: [1.0; 3], square: [2.0; 3], excess: [excess(i); 3] };
+        let pixel = |i| PilotPixel {
+            radiance: [1.0; 3],
+            square: [2.0; 3],
+            radiance_without: [1.0; 3],
+            square_without: [2.0; 3],
+            excess: [excess(i); 3],
+            shared: [0.0; 3],
+        };
         of_means((0..400).map(pixel).collect()).gain(0.0).unwrap()
     }
 

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::integrator_overrides::unsupported_with_light_paths;
+use super::integrator_overrides::{unsupported_with_light_paths, unsupported_with_photons};
 use super::state::put;
-use super::{Settings, Stats};
+use super::{LightTracing, Settings, Stats};
 use crate::compile::check_film_and_integrator;
 use crate::desc::{FilmDesc, OutputDesc};
 use crate::error::{Error, Result};
@@ -51,9 +51,6 @@ pub struct RenderProvenance {
     pub frame: Option<SequenceFrame>,
     /// What the picture depends on beside the scene.
     pub settings: Settings,
-    /// Whether paths were connected to light paths, if a pilot has decided that.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub bidirectional: Option<bool>,
     /// Whether the picture was denoised, with the denoiser's own defaults.
     #[serde(default)]
     pub denoise: bool,
@@ -86,7 +83,6 @@ impl RenderProvenance {
             allow_missing: false,
             frame: None,
             settings: settings.clone(),
-            bidirectional: None,
             denoise: false,
             output: None,
         }
@@ -95,8 +91,8 @@ impl RenderProvenance {
     /// The same with the samples that the picture has got in the end, and with what a pilot has decided.
     #[must_use]
     pub fn of_render(mut self, stats: &Stats) -> Self {
-        if self.settings.bidirectional().is_none() {
-            self.bidirectional = Some(stats.bidirectional);
+        if self.settings.light_tracing().is_none() {
+            self.settings.light_tracing = Some(stats.light_tracing);
         }
         if self.settings.target_error.is_none() {
             self.settings.spp = stats.spp_done;
@@ -195,12 +191,12 @@ impl RenderProvenance {
         let guided = self.settings.is_guided() && target_error.is_some();
         require(!guided, "settings.target_error", "must be null with guiding")?;
         let has_guide = self.settings.guide.is_some();
-        require(
-            (self.bidirectional != Some(true) && self.settings.bidirectional() == Some(false))
-                || unsupported_with_light_paths(integrator, has_guide, target_error.is_some()).is_none(),
-            "settings.integrator.bidirectional",
-            "must be off with what it does not support",
-        )?;
+        let unsupported = match self.settings.light_tracing() {
+            Some(LightTracing::Off) => None,
+            Some(LightTracing::Photons) => unsupported_with_photons(integrator, has_guide, target_error.is_some()),
+            _ => unsupported_with_light_paths(integrator, has_guide, target_error.is_some()),
+        };
+        require(unsupported.is_none(), "settings.integrator", "must not have light tracing with what excludes it")?;
         require(self.import.time.is_finite(), "import.time", "must be finite")?;
         require(
             self.frame.is_none_or(|frame| i32::try_from(frame.number).is_ok()),
@@ -223,11 +219,7 @@ impl RenderProvenance {
     pub fn settings(&self, threads: usize) -> Settings {
         let layers = self.output.iter().flat_map(|output| &output.layers).collect();
         let outputs = self.output.iter().cloned().collect();
-        let settings = Settings { layers, outputs, threads, time_limit: None, ..self.settings.clone() };
-        match self.bidirectional {
-            Some(is_bidirectional) => settings.with_bidirectional(is_bidirectional),
-            None => settings,
-        }
+        Settings { layers, outputs, threads, time_limit: None, ..self.settings.clone() }
     }
 }
 
@@ -363,14 +355,15 @@ mod tests {
     fn what_a_pilot_has_decided_is_repeated() {
         let mut recipe = RenderProvenance::from_value(provenance(), Path::new("a.exr")).unwrap();
         recipe.settings.spp = 64;
-        for bidirectional in [true, false] {
-            let stats = Stats { spp_done: 3, bidirectional, ..Stats::default() };
+        for light_tracing in [LightTracing::Off, LightTracing::Photons, LightTracing::Bidirectional] {
+            let stats = Stats { spp_done: 3, light_tracing, ..Stats::default() };
             let value = recipe.clone().of_render(&stats).to_value();
             let settings = RenderProvenance::from_value(value.clone(), Path::new("a.exr")).unwrap().settings(1);
-            assert_eq!((settings.spp, settings.bidirectional()), (3, Some(bidirectional)));
+            assert_eq!((settings.spp, settings.light_tracing()), (3, Some(light_tracing)));
             let mut unsupported = value;
             unsupported["settings"]["integrator"]["guiding"] = "on".into();
-            assert_eq!(RenderProvenance::from_value(unsupported, Path::new("a.exr")).is_err(), bidirectional);
+            let is_refused = RenderProvenance::from_value(unsupported, Path::new("a.exr")).is_err();
+            assert_eq!(is_refused, light_tracing != LightTracing::Off);
         }
     }
 }

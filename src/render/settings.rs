@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::integrator_overrides::integrator;
 use super::outputs::outputs;
-use super::{GuidingStage, Overrides, Shard, TrainedGuide};
+use super::{GuidingStage, LightTracing, Overrides, Shard, TrainedGuide};
 use crate::accel::AccelKind;
 use crate::desc::{
     AutoDesc, CausticsDesc, FilterDesc, IntegratorDesc, LayerKind, MAX_SIDE, OutputDesc, SceneDesc, StrategyDesc,
@@ -27,12 +27,12 @@ const MOST_SAMPLES: u32 = 1 << 16;
 /// More threads than this are a slip of the keyboard.
 const MAX_THREADS: usize = 4096;
 
-/// A pilot decides on bidirectional path tracing only of pictures with at least as many samples per pixel, so that it
+/// A pilot decides on photons and light paths only of pictures with at least as many samples per pixel, so that it
 /// costs little.
-const LEAST_BIDIRECTIONAL_SPP: u32 = 16;
+const LEAST_LIGHT_TRACING_SPP: u32 = 16;
 
-/// And with paths of at least as many segments: others have no connections.
-const LEAST_BIDIRECTIONAL_DEPTH: u32 = 3;
+/// And with paths of at least as many segments: others have neither connections nor caustics.
+const LEAST_LIGHT_TRACING_DEPTH: u32 = 3;
 
 /// A pilot decides on guiding only of pictures with at least as many samples per pixel, so that it costs little,
 const LEAST_GUIDED_SPP: u32 = 128;
@@ -71,6 +71,9 @@ pub struct Settings {
     pub seed: u64,
     /// The algorithm.
     pub integrator: IntegratorDesc,
+    /// What is traced from the lights, if a pilot has decided that before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light_tracing: Option<LightTracing>,
     /// What guides paths, if a guide was trained before.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub guide: Option<TrainedGuide>,
@@ -121,6 +124,7 @@ impl Settings {
             target_error: target_error(overrides)?,
             seed: overrides.seed.unwrap_or(desc.sampler.seed),
             integrator,
+            light_tracing: None,
             guide: overrides.guide.clone(),
             accel: overrides.accel.unwrap_or_default(),
             depth_of_field: !overrides.no_depth_of_field,
@@ -131,31 +135,36 @@ impl Settings {
         })
     }
 
-    /// Whether paths gather photons.
-    pub fn gathers_photons(&self) -> bool {
+    /// What is traced from the lights: `None` if a pilot decides.
+    pub fn light_tracing(&self) -> Option<LightTracing> {
+        let IntegratorDesc::Path { caustics, bidirectional, max_depth, .. } = self.integrator else {
+            return Some(LightTracing::Off);
+        };
+        let has_pilot = self.spp >= LEAST_LIGHT_TRACING_SPP && max_depth >= LEAST_LIGHT_TRACING_DEPTH;
+        self.light_tracing.or(match (caustics, bidirectional) {
+            (CausticsDesc::Photons, _) => Some(LightTracing::Photons),
+            (_, AutoDesc::On) => Some(LightTracing::Bidirectional),
+            (CausticsDesc::Auto, _) | (_, AutoDesc::Auto) if has_pilot => None,
+            _ => Some(LightTracing::Off),
+        })
+    }
+
+    /// Whether this may be traced from the lights, if only because a pilot decides so.
+    pub(super) fn may_trace(&self, what: LightTracing) -> bool {
+        let IntegratorDesc::Path { caustics, bidirectional, .. } = self.integrator else { return false };
+        self.light_tracing().map_or(
+            match what {
+                LightTracing::Off => true,
+                LightTracing::Photons => caustics != CausticsDesc::Paths,
+                LightTracing::Bidirectional => bidirectional != AutoDesc::Off,
+            },
+            |known| known == what,
+        )
+    }
+
+    /// Whether photons start at lights too that paths never meet: what a pilot decides must not change the picture.
+    pub(super) fn traces_delta_lights(&self) -> bool {
         matches!(self.integrator, IntegratorDesc::Path { caustics: CausticsDesc::Photons, .. })
-    }
-
-    /// Whether paths are connected to light paths: `None` if a pilot decides.
-    pub(crate) fn bidirectional(&self) -> Option<bool> {
-        match self.integrator {
-            IntegratorDesc::Path { bidirectional: AutoDesc::On, .. } => Some(true),
-            IntegratorDesc::Path { bidirectional: AutoDesc::Auto, max_depth, .. }
-                if self.spp >= LEAST_BIDIRECTIONAL_SPP && max_depth >= LEAST_BIDIRECTIONAL_DEPTH =>
-            {
-                None
-            }
-            _ => Some(false),
-        }
-    }
-
-    /// With or without connections to light paths, as far as the integrator has them.
-    #[must_use]
-    pub(crate) fn with_bidirectional(mut self, is_bidirectional: bool) -> Self {
-        if let IntegratorDesc::Path { bidirectional, .. } = &mut self.integrator {
-            *bidirectional = is_bidirectional.into();
-        }
-        self
     }
 
     /// Whether paths train a guide in any case: a sample then depends on all that were before.
@@ -188,8 +197,7 @@ impl Settings {
         };
         self.guide.is_none()
             && self.target_error.is_none()
-            && !self.gathers_photons()
-            && self.bidirectional() != Some(true)
+            && matches!(self.light_tracing(), None | Some(LightTracing::Off))
             && strategy == StrategyDesc::Mis
             && max_depth >= LEAST_GUIDED_DEPTH
     }
@@ -386,8 +394,8 @@ mod tests {
             guiding: AutoDesc::default(),
             roulette: None,
             light_samples: None,
-            caustics: CausticsDesc::Paths,
             // Unsupported with such a strategy.
+            caustics: CausticsDesc::Paths,
             bidirectional: AutoDesc::Off,
         };
         assert_eq!(s.integrator, changed);

@@ -3,12 +3,12 @@
 use std::ops::Range;
 use std::sync::Mutex;
 
-use super::bidirectional_pilot;
 use super::caustic_pass::CausticPass;
 use super::light_path_pass::LightPathPass;
+use super::light_tracing_pilot;
 use super::pixel_order::{pixel_of_slot, slots};
 use super::roulette_pass::RouletteEstimates;
-use super::{FINEST_SPP, Settings, TILE_SIZE, film_shape};
+use super::{FINEST_SPP, LightTracing, Settings, TILE_SIZE, film_shape};
 use crate::accel::Accelerator;
 use crate::desc::{IntegratorDesc, RouletteDesc};
 use crate::film::{
@@ -39,15 +39,18 @@ pub(super) struct TileRenderer<'a> {
     pub grid: FilmGrid,
     /// What guides all samples, if it was trained before.
     guide: Option<Guide>,
-    /// What traces and keeps photons, if paths gather them.
-    caustics: Option<CausticPass>,
+    /// What traces and keeps photons, if paths gather them or may do so.
+    pub caustics: Option<CausticPass>,
     /// What traces and keeps light paths, if paths are connected to them or may be.
     pub light_paths: Option<LightPathPass>,
     /// What Russian roulette goes by, if it is to and the pilot was traced.
     roulette: Option<RouletteEstimates>,
     /// Lights that are sampled at the first vertex of a path; `None` for as many as the pilot finds best.
     light_samples: Option<u32>,
+    /// Whether the pilot of roulette is to be traced.
     needs_pilot: bool,
+    /// Which of photons and light paths is to be kept; `None` if a pilot decides.
+    light_tracing: Option<LightTracing>,
 }
 
 /// The buffers of one thread.
@@ -127,7 +130,7 @@ impl<'a> TileRenderer<'a> {
             overscan: settings.overscan,
             filter,
             view: settings.size,
-            caustics: settings.gathers_photons().then(|| CausticPass::new(scene, accel, settings)).flatten(),
+            caustics: CausticPass::new(scene, accel, settings),
             light_paths: LightPathPass::new(scene, settings),
             guide: settings.guide.as_ref().and_then(|guide| guide.of_scene(accel.bounds())),
             roulette: None,
@@ -136,6 +139,7 @@ impl<'a> TileRenderer<'a> {
                 _ => None,
             },
             needs_pilot: settings.integrator.roulette() == Some(RouletteDesc::Auto),
+            light_tracing: settings.light_tracing(),
         }
     }
 
@@ -154,22 +158,26 @@ impl<'a> TileRenderer<'a> {
         }
     }
 
-    /// Traces the pilots of the picture, as far as they are needed: that of roulette, and that of bidirectional path
-    /// tracing unless what it found is known.
-    pub fn prepare(&mut self, workspaces: &[Mutex<TileWorkspace>], is_bidirectional: Option<bool>) {
+    /// Traces the pilots of the picture, as far as they are needed: that of roulette, and that of photons and light
+    /// paths unless what it found is known.
+    pub fn prepare(&mut self, workspaces: &[Mutex<TileWorkspace>], known: Option<LightTracing>) {
         if self.needs_pilot {
             self.roulette = RouletteEstimates::new(self, workspaces, self.light_samples);
         }
-        if let Some(light_paths) = self.light_paths.take_if(|light_paths| light_paths.needs_pilot)
-            && is_bidirectional.unwrap_or_else(|| bidirectional_pilot::pays(self, &light_paths, workspaces))
-        {
-            self.light_paths = Some(light_paths);
-        }
+        let choice = self.light_tracing.or(known).unwrap_or_else(|| light_tracing_pilot::choose(self, workspaces));
+        self.caustics.take_if(|_| choice != LightTracing::Photons);
+        self.light_paths.take_if(|_| choice != LightTracing::Bidirectional);
     }
 
-    /// Whether paths are connected to light paths.
-    pub fn is_bidirectional(&self) -> bool {
-        self.light_paths.is_some()
+    /// What is traced from the lights.
+    pub fn light_tracing(&self) -> LightTracing {
+        if self.light_paths.is_some() {
+            LightTracing::Bidirectional
+        } else if self.caustics.is_some() {
+            LightTracing::Photons
+        } else {
+            LightTracing::Off
+        }
     }
 
     /// The pixels of all that the camera shows, on the film's grid.

@@ -91,7 +91,7 @@ pub struct LightPaths<'a> {
     pub vertices: &'a [LightVertex],
     /// The number of paths.
     pub traced: u32,
-    /// Whether [`Workspace::excess_moments`](super::Workspace::excess_moments) are wanted.
+    /// Whether [`Workspace::pilot_moments`](super::Workspace::pilot_moments) are wanted.
     pub has_moments: bool,
 }
 

@@ -18,6 +18,8 @@ pub struct CausticCasters {
     table: AliasTable,
     /// By shape, one over the area of all casters; 0 for shapes that are none.
     pdf_area: Vec<f32>,
+    /// Whether photons of lights start there that paths never meet.
+    pub traces_delta_lights: bool,
 }
 
 /// A point of such a surface.
@@ -32,9 +34,11 @@ pub struct CausticPoint {
 }
 
 impl CausticCasters {
-    /// Those of a scene; `None` if it has none, or if something moves while the shutter is open.
-    pub fn new(scene: &Scene) -> Option<Self> {
-        if scene.features.motion || scene.lights.is_empty() {
+    /// Those of a scene; `None` if it has none, if no photons can start there, or if something moves while the shutter
+    /// is open.
+    pub fn new(scene: &Scene, traces_delta_lights: bool) -> Option<Self> {
+        let has_lights = scene.lights.lights().iter().any(|light| traces_delta_lights || !light.is_delta());
+        if scene.features.motion || !has_lights {
             return None;
         }
         let (mut prims, mut areas, mut is_caster) = (Vec::new(), Vec::new(), vec![false; scene.surfaces.len()]);
@@ -52,7 +56,7 @@ impl CausticCasters {
         }
         let density = 1.0 / areas.iter().sum::<f64>();
         let pdf_area = is_caster.into_iter().map(|is_caster| if is_caster { density as f32 } else { 0.0 }).collect();
-        Some(Self { prims, table: AliasTable::new(&areas)?, pdf_area })
+        Some(Self { prims, table: AliasTable::new(&areas)?, pdf_area, traces_delta_lights })
     }
 
     /// The density per area with which points of a shape are chosen, up to differences within an analytic shape whose

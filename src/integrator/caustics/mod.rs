@@ -25,4 +25,6 @@ pub struct Caustics<'a> {
     pub casters: &'a CausticCasters,
     /// The photons.
     pub photons: &'a PhotonMap,
+    /// Whether [`Workspace::pilot_moments`](super::Workspace::pilot_moments) are wanted.
+    pub has_moments: bool,
 }

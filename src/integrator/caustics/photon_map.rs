@@ -1,7 +1,6 @@
 //! Photons, found by place.
 
 use std::f32::consts::PI;
-use std::ops::Range;
 
 use rayon::prelude::*;
 
@@ -36,7 +35,7 @@ pub struct Photon {
 pub struct PhotonMap {
     photons: Vec<Photon>,
     /// By bucket.
-    references: Vec<Reference>,
+    references: Vec<PhotonReference>,
     /// By bucket, its first reference; one more than there are buckets, whose number is a power of two.
     starts: Vec<u32>,
     radius: f32,
@@ -45,16 +44,16 @@ pub struct PhotonMap {
 
 /// A photon in a bucket, with its point.
 #[derive(Clone, Copy, Debug)]
-struct Reference {
+pub struct PhotonReference {
     p: Vec3,
     photon: u32,
 }
 
 /// The width of a cell over the radius.
-const CELL_WIDTH: f32 = 2.0;
+const CELL_WIDTH: f32 = 4.0;
 
 /// References of a photon, about.
-const REFERENCES: usize = 8;
+const REFERENCES: usize = 4;
 
 impl PhotonMap {
     /// The photons that arrived of `traced` ones, to be gathered within a positive `radius`.
@@ -76,7 +75,8 @@ impl PhotonMap {
         for bucket in 0..buckets {
             map.starts[bucket + 1] += map.starts[bucket];
         }
-        map.references = keys.iter().map(|&(_, i)| Reference { p: map.photons[i as usize].p, photon: i }).collect();
+        map.references =
+            keys.iter().map(|&(_, i)| PhotonReference { p: map.photons[i as usize].p, photon: i }).collect();
         map
     }
 
@@ -91,27 +91,26 @@ impl PhotonMap {
         self.traced as f32 * PI * self.radius * self.radius
     }
 
-    /// The references of photons that may be near a point.
+    /// Those that may be near a point.
     #[inline]
-    pub fn candidates(&self, p: Vec3) -> Range<u32> {
+    pub fn candidates(&self, p: Vec3) -> &[PhotonReference] {
         let bucket = self.bucket(self.cell(p));
-        self.starts[bucket]..self.starts[bucket + 1]
+        &self.references[self.starts[bucket] as usize..self.starts[bucket + 1] as usize]
     }
 
-    /// Visits the photons among the candidates of a point that are around it, where a surface has the unit geometric
-    /// normal `n`.
+    /// The photons among the candidates of a point that are around it, where a surface has the unit geometric normal
+    /// `n`.
     #[inline]
-    pub fn for_each_near(&self, candidates: Range<u32>, p: Vec3, n: Vec3, mut visit: impl FnMut(&Photon)) {
-        for reference in &self.references[candidates.start as usize..candidates.end as usize] {
+    pub fn near<'a>(&'a self, candidates: &'a [PhotonReference], p: Vec3, n: Vec3) -> impl Iterator<Item = &'a Photon> {
+        candidates.iter().filter_map(move |reference| {
             let d = reference.p - p;
-            if d.length_squared() < self.radius * self.radius {
-                let photon = &self.photons[reference.photon as usize];
-                // Arrived on a surface that is about the same.
-                if d.dot(n).abs() < 0.5 * self.radius && photon.n.dot(n).abs() > 0.7 {
-                    visit(photon);
-                }
+            if d.length_squared() >= self.radius * self.radius || d.dot(n).abs() >= 0.5 * self.radius {
+                return None;
             }
-        }
+            // Arrived on a surface that is about the same.
+            let photon = &self.photons[reference.photon as usize];
+            (photon.n.dot(n).abs() > 0.7).then_some(photon)
+        })
     }
 
     /// The buckets of the cells from which a photon can be gathered, each once.

@@ -49,7 +49,7 @@ pub(super) fn shading_ratio(vertices: &Vertices, lane: usize) -> f32 {
 
 /// The state of the path that goes on from a vertex.
 pub(super) fn after(context: &Context, vertices: &Vertices, lane: usize, state: CausticState) -> CausticState {
-    let Some(Caustics { casters, photons }) = context.pass.caustics else { return state };
+    let Some(Caustics { casters, photons, .. }) = context.pass.caustics else { return state };
     let Vertices { rows, scatter, .. } = vertices;
     let cos = scatter.direction.get(lane).dot(rows.n_g.get(lane)).abs();
     if scatter.is_delta[lane] == 0 {
@@ -65,49 +65,53 @@ pub(super) fn after(context: &Context, vertices: &Vertices, lane: usize, state: 
 /// Adds the light of the photons around a block's vertices.
 pub(super) fn gather(context: &Context, wave: &mut Wave, block: usize, out: &mut Output) {
     let Some(Caustics { photons, .. }) = context.pass.caustics else { return };
-    let Wave { vertices, light_aovs, .. } = &*wave;
-    let area = photons.gathered_area();
-    let mut candidates = [(0, 0); BATCH];
-    for (lane, candidates) in candidates.iter_mut().enumerate().take(vertices.count) {
-        let found = photons.candidates(vertices.points.p.get(lane).as_vec3());
-        *candidates = (found.start, found.end);
+    let Wave { vertices, light_aovs, moments, .. } = wave;
+    let Vertices { rows, points, count, .. } = &*vertices;
+    // All buckets are looked up before any is read, so that the processor waits for memory once.
+    let mut candidates = [[].as_slice(); BATCH];
+    for (lane, candidates) in candidates.iter_mut().enumerate().take(*count) {
+        *candidates = photons.candidates(points.p.get(lane).as_vec3());
     }
-    for lane in 0..vertices.count.min(BATCH) {
-        let rows = &vertices.rows;
-        if candidates[lane].0 == candidates[lane].1
-            || rows.flags[lane] & (vertex_flags::DELTA | vertex_flags::MISS) != 0
-        {
-            continue;
-        }
-        let (throughput, slot) = (rows.throughput.get(lane), rows.slot[lane]);
-        photons.for_each_near(
-            candidates[lane].0..candidates[lane].1,
-            vertices.points.p.get(lane).as_vec3(),
-            rows.n_g.get(lane),
-            |photon| {
-                let is_short = context.bounce + photon.scatterings + 2 <= context.config.max_depth;
-                let Some(scattered) = scattered(context, vertices, lane, photon, area).filter(|_| is_short) else {
-                    return;
+    let scatters = |lane: usize| rows.flags[lane] & (vertex_flags::DELTA | vertex_flags::MISS) == 0;
+    for lane in (0..(*count).min(BATCH)).filter(|&lane| !candidates[lane].is_empty() && scatters(lane)) {
+        let (p, n) = (points.p.get(lane).as_vec3(), rows.n_g.get(lane));
+        for photon in photons.near(candidates[lane], p, n) {
+            let scatterings = context.bounce + 1 + photon.scatterings;
+            let Some(scattered) = scattered(context, vertices, lane, photon) else { continue };
+            if scatterings >= context.config.max_depth {
+                continue;
+            }
+            let (slot, light) = (rows.slot[lane], rows.throughput.get(lane) * scattered.light);
+            let light = context.config.clamped(light, scatterings);
+            out.add(slot, light);
+            moments.add_photon(slot, light, scattered.weight, scattered.density_ratio);
+            if context.config.needs_light_aovs() {
+                let event = if context.bounce == 0 && context.config.light_aovs.by_scattering {
+                    let wi = vertices.frame(lane).to_local(photon.wi);
+                    LightEvent::Indirect(vertices.lobes(context.scene, lane, wi))
+                } else {
+                    light_aovs.event(context.bounce + 2, block * BATCH + vertices.path(lane), LightEvent::Emission)
                 };
-                let light = context.config.clamped(throughput * scattered, context.bounce + 1 + photon.scatterings);
-                out.add(slot, light);
-                if context.config.needs_light_aovs() {
-                    let event = if context.bounce == 0 && context.config.light_aovs.by_scattering {
-                        let wi = vertices.frame(lane).to_local(photon.wi);
-                        LightEvent::Indirect(vertices.lobes(context.scene, lane, wi))
-                    } else {
-                        light_aovs.event(context.bounce + 2, block * BATCH + vertices.path(lane), LightEvent::Emission)
-                    };
-                    out.add_to_light_aovs(context, slot, light, event, photon.light);
-                }
-            },
-        );
+                out.add_to_light_aovs(context, slot, light, event, photon.light);
+            }
+        }
     }
 }
 
-/// The radiance that a vertex scatters of a photon's light, weighted by MIS against finding it by chance.
+/// What a vertex scatters of a photon's light.
+struct Scattered {
+    /// Radiance, weighted by MIS against finding it by chance.
+    light: Rgb,
+    /// That weight.
+    weight: f32,
+    /// The density of photons over that of finding it by chance.
+    density_ratio: f32,
+}
+
+/// What a vertex scatters of a photon's light, if anything.
 #[inline]
-fn scattered(context: &Context, vertices: &Vertices, lane: usize, photon: &Photon, area: f32) -> Option<Rgb> {
+fn scattered(context: &Context, vertices: &Vertices, lane: usize, photon: &Photon) -> Option<Scattered> {
+    let area = context.pass.caustics?.photons.gathered_area();
     let rows = &vertices.rows;
     let wi = vertices.frame(lane).to_local(photon.wi);
     let cos = photon.wi.dot(rows.n_g.get(lane));
@@ -124,7 +128,7 @@ fn scattered(context: &Context, vertices: &Vertices, lane: usize, photon: &Photo
     let density = area * photon.density * cos.abs();
     let weight = if density.is_finite() { power_heuristic(density, eval.pdf) } else { 1.0 };
     let light = eval.value * photon.power * (factor * weight / (area * cos.abs()));
-    (!light.is_black()).then_some(light)
+    (!light.is_black()).then_some(Scattered { light, weight, density_ratio: density / eval.pdf })
 }
 
 /// Photons are not gathered where they graze a surface: their density is not known there.

@@ -4,7 +4,6 @@ use super::Context;
 use super::block::{EvalRows, VertexRows, Vertices, spawn};
 use super::evals::Surfaces;
 use super::wave::Wave;
-use crate::color::Rgb;
 use crate::id::LightId;
 use crate::integrator::bidirectional::{CONNECTIONS_PER_VERTEX, LightPaths, PartialMis, bounded, squared};
 use crate::integrator::vertex::HemisphereTest;
@@ -80,44 +79,6 @@ impl ConnectionMis {
     pub fn after(&self, lane: usize) -> ConnectionState {
         let is_connectable = self.densities.is_connectable[lane] != 0;
         ConnectionState { d_vc: self.mis.next_d_vc[lane], is_connectable }
-    }
-}
-
-/// The second moments that samples would have without connections, beyond those that they have.
-#[derive(Default)]
-pub(super) struct ConnectionMoments {
-    /// By sample, and channel; empty where they are not wanted.
-    excess: Vec<[f64; 3]>,
-    /// By shadow ray, as [`DensityRows::moment_ratio`].
-    pub ratios: Vec<f32>,
-}
-
-impl ConnectionMoments {
-    pub fn start(&mut self, light_paths: Option<&LightPaths>, samples: usize) {
-        self.excess.clear();
-        if light_paths.is_some_and(|light_paths| light_paths.has_moments) {
-            self.excess.resize(samples, [0.0; 3]);
-        }
-    }
-
-    pub fn is_wanted(&self) -> bool {
-        !self.excess.is_empty()
-    }
-
-    /// By sample, and channel.
-    pub fn excess(&self) -> &[[f64; 3]] {
-        &self.excess
-    }
-
-    /// Adds the light of a shadow ray that nothing blocks.
-    #[inline]
-    pub fn add(&mut self, ray: usize, slot: u32, light: Rgb) {
-        if let Some(excess) = self.excess.get_mut(slot as usize) {
-            let ratio = f64::from(self.ratios[ray]) - 1.0;
-            for (excess, value) in excess.iter_mut().zip(light.to_array()) {
-                *excess += f64::from(value) * f64::from(value) * ratio;
-            }
-        }
     }
 }
 

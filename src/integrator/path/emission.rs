@@ -42,7 +42,7 @@ pub(super) fn bsdf_mis_weight(
 
 /// Adds the light of emitters at a block's vertices.
 pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Output) {
-    let Wave { vertices, paths, rays, light_aovs, caustics, connections, media, .. } = &*wave;
+    let Wave { vertices, paths, rays, light_aovs, caustics, connections, media, moments, .. } = wave;
     let (paths, rays) = (&paths[block], &rays[block]);
     for &lane in &vertices.emitters {
         let lane = usize::from(lane);
@@ -60,6 +60,10 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
             continue;
         }
         out.add(paths.slot[i], light);
+        if moments.has_chance && paths.is_specular(i) {
+            let plain = Met { caustic: None, ..met }.emitted(context, &at).map_or(Rgb::BLACK, |(_, radiance)| radiance);
+            moments.add_chance(paths.slot[i], light, paths.throughput.get(i) * plain);
+        }
         if context.config.needs_light_aovs() {
             let event = light_aovs.event(context.bounce, block * BATCH + i, LightEvent::Emission);
             out.add_to_light_aovs(context, paths.slot[i], light, event, id);

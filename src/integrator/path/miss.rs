@@ -22,7 +22,7 @@ pub(super) struct MissScratch {
 
 /// Adds the light that a block's paths meet which leave the scene.
 pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Output) {
-    let Wave { vertices, paths, rays, light_aovs, miss, caustics, .. } = wave;
+    let Wave { vertices, paths, rays, light_aovs, miss, caustics, moments, .. } = wave;
     let (paths, rays, misses) = (&paths[block], &rays[block], &vertices.misses);
     let is_black = context.scene.lights.at_infinity().is_empty();
     let needs_aovs = context.config.needs_light_aovs() || context.needs_surface_aovs();
@@ -52,6 +52,10 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
             }
             let light = context.config.clamped(paths.throughput.get(i) * miss.radiance(context), context.bounce);
             out.add(slot, light);
+            if moments.has_chance && paths.is_specular(i) {
+                let plain = Miss { caustic: None, ..miss }.radiance(context);
+                moments.add_chance(slot, light, paths.throughput.get(i) * plain);
+            }
             if context.config.needs_light_aovs() {
                 let event = light_aovs.event(context.bounce, block * BATCH + i, LightEvent::Environment);
                 miss.add_to_light_aovs(context, light, event, out);

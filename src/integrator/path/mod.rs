@@ -21,6 +21,7 @@ mod light_paths;
 mod materials;
 mod media;
 mod miss;
+mod moments;
 mod photons;
 mod radiance;
 mod scatter;
@@ -37,7 +38,7 @@ use super::emitter_prims::EmitterPrims;
 use super::regularization::Regularization;
 use super::{
     CameraBatch, CausticCasters, Emitters, Guidance, Integrator, LightVertex, PassContext, Photon, PhotonRange,
-    PilotRecords, Roulette, SecondMoments, Strategy, SurfaceAovs, Workspace, World, dimensions,
+    PilotMoments, PilotRecords, Roulette, SecondMoments, Strategy, SurfaceAovs, Workspace, World, dimensions,
 };
 use crate::color::Rgb;
 use crate::film::{LightAovRequest, SampleBatch};
@@ -138,9 +139,9 @@ impl PathBuffers {
         self.0.guided.second_moments(out)
     }
 
-    /// As [`Workspace::excess_moments`].
-    pub fn excess_moments(&self) -> &[[f64; 3]] {
-        self.0.moments.excess()
+    /// As [`Workspace::pilot_moments`].
+    pub fn pilot_moments(&self) -> &[PilotMoments] {
+        self.0.moments.samples()
     }
 }
 

@@ -3,7 +3,7 @@
 use super::block::{Vertices, spawn, vertex_flags};
 use super::caustics::shading_ratio;
 use super::wave::Wave;
-use super::{Context, PathBuffers, PathIntegrator, materials, media, scatter, trace, vertices};
+use super::{Context, PathBuffers, PathIntegrator, materials, media, scatter, specular_direct, trace, vertices};
 use crate::color::Rgb;
 use crate::geometry::Hit;
 use crate::id::LightId;
@@ -68,6 +68,8 @@ pub(super) fn trace(
             materials::replace_bsdfs(&context, wave, block);
             if bounce > 0 {
                 store(wave, block, bounce, photons);
+            } else {
+                drop_found(&context, wave, block);
             }
             materials::sort_by_bsdf(&mut wave.vertices);
             vertices::build_frames(&context, wave);
@@ -114,6 +116,9 @@ fn emitted(context: &Context, source: &Source, index: u32) -> Option<(CameraSamp
     let power = sample.radiance * (cos / (light_pdf * start.pdf_area as f32));
     // Paths never meet a delta light: its photons have the whole weight.
     let is_only_way = sample.is_delta;
+    if is_only_way && !source.casters.traces_delta_lights {
+        return None;
+    }
     let density = source.casters.pdf_area(start.shape, Hit::NO_INSTANCE) * light_pdf / cos;
     let density = if is_only_way { f32::INFINITY } else { density };
     if power.is_black() || !power.is_finite() || density.is_nan() || (density.is_infinite() && !is_only_way) {
@@ -146,6 +151,18 @@ fn keep_starts(wave: &mut Wave, block: usize) {
         if rows.shape[lane] != shape.0 || (at - point.p).length() > tolerance {
             rows.flags[lane] |= vertex_flags::MISS;
             rows.throughput.set(lane, Rgb::BLACK);
+        }
+    }
+}
+
+/// Ends the photons whose light is found without them.
+fn drop_found(context: &Context, wave: &mut Wave, block: usize) {
+    let Wave { vertices, photons, .. } = wave;
+    for lane in 0..vertices.count {
+        let light = photons[block * BATCH + vertices.path(lane)].light;
+        if specular_direct::finds_photon(context, vertices.rows.flags[lane], light) {
+            vertices.rows.flags[lane] |= vertex_flags::MISS;
+            vertices.rows.throughput.set(lane, Rgb::BLACK);
         }
     }
 }

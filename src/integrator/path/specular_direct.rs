@@ -37,11 +37,16 @@ pub(super) fn emitters<'a>(config: &PathIntegrator, pass: &PassContext<'a>) -> O
     pass.world.emitter_prims.as_ref().filter(|_| is_plain)
 }
 
-/// Whether this is done at the vertices of this bounce. After the first scattering photons and light paths have
-/// weights against finding emitters by reflection.
+/// Whether this is done at the vertices of this bounce. After the first scattering light paths have weights against
+/// finding emitters by reflection.
 pub(super) fn is_enabled(context: &Context) -> bool {
-    let is_weighted = context.pass.caustics.is_some() || context.pass.light_paths.is_some();
-    context.emitter_prims.is_some() && (context.bounce == 0 || !is_weighted)
+    context.emitter_prims.is_some() && (context.bounce == 0 || context.pass.light_paths.is_none())
+}
+
+/// Whether light that a photon carries from an emitter to its first vertex, with these flags, is found in this way.
+pub(super) fn finds_photon(context: &Context, flags: u32, light: LightId) -> bool {
+    let is_found = context.emitter_prims.is_some() && flags & vertex_flags::MIXED_SPECULAR != 0;
+    is_found && matches!(context.scene.lights.get(light), Light::Area(_))
 }
 
 /// Queues the shadow rays of a block's vertices along specular reflections.

@@ -50,7 +50,7 @@ pub(super) fn shadow(context: &Context, wave: &mut Wave, out: &mut Output, count
             let rows = &shadows.rows[block];
             let (slot, light) = (rows.slot[i % BATCH], rows.contribution.get(i % BATCH));
             out.add(slot, light);
-            wave.moments.add(i, slot, light);
+            wave.moments.add_shadow_ray(i, slot, light);
             if context.bounce == 0 {
                 wave.continuations.add_direct(i, slot, light);
             }

@@ -2,13 +2,14 @@
 
 use super::block::{Vertices, spawn};
 use super::caustics::CausticState;
-use super::connection_mis::{ConnectionMis, ConnectionMoments, ConnectionState};
+use super::connection_mis::{ConnectionMis, ConnectionState};
 use super::connections::LightVertexRows;
 use super::continuations::ContinuationRecorder;
 use super::guided::GuideRecorder;
 use super::light_aovs::{LightAovs, PathMove};
 use super::light_paths::LightPathState;
 use super::miss::MissScratch;
+use super::moments::Moments;
 use super::photons::PhotonState;
 use super::specular_direct::SpecularRows;
 use super::terminator::TerminatorRays;
@@ -150,7 +151,7 @@ pub(super) struct Wave {
     pub connections: Vec<ConnectionState>,
     pub connection_mis: ConnectionMis,
     pub connection_ends: LightVertexRows,
-    pub moments: ConnectionMoments,
+    pub moments: Moments,
     /// By light path, where the wave is one of light paths.
     pub light_paths: Vec<LightPathState>,
     pub light_aovs: LightAovs,
@@ -202,7 +203,7 @@ impl Wave {
         if context.pass.light_paths.is_some() {
             self.connections.resize(samples.len(), ConnectionState::default());
         }
-        self.moments.start(context.pass.light_paths, samples.len());
+        self.moments.start(context.pass, samples.len());
         self.light_aovs.start(context.config, samples.len());
         self.guided.clear();
         self.shadows.count = 0;
@@ -305,7 +306,7 @@ impl Wave {
                 self.light_aovs.shadow_sources.push((event, LightId(self.vertices.light_samples.light[lane])));
             }
         }
-        if self.moments.is_wanted() {
+        if self.moments.has_ratios {
             let ratio = |lane| if scatterings > 0 { self.connection_mis.densities.moment_ratio[lane] } else { 1.0 };
             self.moments.ratios.extend((0..BATCH).filter(|&lane| lanes.contains(lane)).map(ratio));
         }

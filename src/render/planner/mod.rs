@@ -19,7 +19,7 @@ use std::time::Duration;
 
 use super::guiding_pilot::{GuidingPilot, may_pay};
 use super::tile_renderer::{TileRenderer, TileWorkspace};
-use super::{GuidingStage, RenderSession, RenderState, Settings, Shard};
+use super::{GuidingStage, LightTracing, RenderSession, RenderState, Settings, Shard};
 use crate::error::Result;
 use crate::film::{DroppedSample, Film, FilmTile};
 use crate::integrator::{EPOCH, Guidance, RayCounts};
@@ -145,7 +145,7 @@ impl RenderState {
             Planner::Guided(planner) => planner.samples_with_this_guide(self.done),
             Planner::Pilot(_) => PilotPlanner::samples_with_this_guide(self.done),
             // Of one epoch of photons or light paths.
-            Planner::Uniform if session.settings.gathers_photons() || self.bidirectional == Some(true) => {
+            Planner::Uniform if self.light_tracing.is_some_and(|what| what != LightTracing::Off) => {
                 EPOCH - missing.start % EPOCH
             }
             Planner::Uniform => u32::MAX,

@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::film::{Crop, FilmShape};
 use crate::import::SceneFingerprint;
 use crate::output::RenderInfo;
-use crate::render::{BLOCK_SIZE, FINEST_SPP, Settings};
+use crate::render::{BLOCK_SIZE, FINEST_SPP, LightTracing, Settings};
 use crate::scene::Scene;
 
 /// A part of the samples of every pixel: part `index` of `count`, from 1. All of them are part 1 of 1.
@@ -106,9 +106,9 @@ pub struct Header {
     pub tiles_in_partial_pass: u64,
     /// Whether no sample is missing.
     pub complete: bool,
-    /// Whether paths are connected to light paths, once that is decided.
+    /// What is traced from the lights, once that is decided.
     #[serde(default)]
-    pub bidirectional: Option<bool>,
+    pub light_tracing: Option<LightTracing>,
     /// Whether paths are guided from here on.
     #[serde(default)]
     pub guiding: GuidingStage,

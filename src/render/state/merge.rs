@@ -52,7 +52,7 @@ pub fn merge(files: &[PathBuf], partial: bool) -> Result<Merged> {
     } else {
         let mut state = RenderState::of_film(film(&headers[0], first)?, Planner::Uniform, Shard::WHOLE);
         files.iter().try_for_each(|file| add(&mut state, file))?;
-        state.bidirectional = headers[0].bidirectional;
+        state.light_tracing = headers[0].light_tracing;
         state
     };
     state.complete = lack.is_none();

@@ -25,7 +25,7 @@ use rayon::prelude::*;
 
 use super::planner::Planner;
 use super::settings::refused;
-use super::{Settings, TILE_SIZE};
+use super::{LightTracing, Settings, TILE_SIZE};
 use crate::error::Result;
 use crate::film::{Film, FilmTile, Image};
 use crate::integrator::RayCounts;
@@ -52,8 +52,8 @@ pub struct RenderState {
     pub torn: bool,
     /// Whether no sample is missing.
     pub complete: bool,
-    /// Whether paths are connected to light paths; `None` before that is decided.
-    pub(super) bidirectional: Option<bool>,
+    /// What is traced from the lights; `None` before that is decided.
+    pub(super) light_tracing: Option<LightTracing>,
     /// What decides on the samples that are missing.
     pub(super) planner: Planner,
     /// Rays so far.
@@ -83,7 +83,7 @@ impl RenderState {
             tiles_in_partial_pass: 0,
             torn: false,
             complete: false,
-            bidirectional: None,
+            light_tracing: None,
             planner,
             rays,
             seconds: 0.0,
@@ -119,7 +119,7 @@ impl RenderState {
     /// Replaces a state of the same shape and planner by that in a file.
     fn load(&mut self, reader: &mut Reader) -> Result<()> {
         (self.done, self.complete) = (reader.header().done, reader.header().complete);
-        self.bidirectional = reader.header().bidirectional;
+        self.light_tracing = reader.header().light_tracing;
         self.tiles_in_partial_pass = (reader.header().tiles_in_partial_pass as usize).min(self.film.tiles().len() - 1);
         self.rays = rays(reader.header().rays);
         self.seconds = reader.header().render_seconds;
@@ -158,7 +158,7 @@ impl RenderState {
             done: self.done,
             tiles_in_partial_pass: self.tiles_in_partial_pass as u64,
             complete: self.complete,
-            bidirectional: self.bidirectional,
+            light_tracing: self.light_tracing,
             guiding: self.planner.guiding(),
             film: self.film.shape().clone(),
             rays: [camera, indirect, shadow],
@@ -184,10 +184,10 @@ impl RenderState {
         super::picture(&self.whole_film(), settings.layers, settings.overscan)
     }
 
-    /// Sets whether paths are connected to light paths, in which case nothing guides them.
-    pub(super) fn set_bidirectional(&mut self, is_bidirectional: bool) {
-        self.bidirectional = Some(is_bidirectional);
-        if is_bidirectional && matches!(self.planner, Planner::Pilot(_)) {
+    /// Sets what is traced from the lights; if anything is, nothing guides paths.
+    pub(super) fn set_light_tracing(&mut self, light_tracing: LightTracing) {
+        self.light_tracing = Some(light_tracing);
+        if light_tracing != LightTracing::Off && matches!(self.planner, Planner::Pilot(_)) {
             self.planner = Planner::Uniform;
         }
     }

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::Faults;
 use crate::accel::{self, AccelKind};
-use crate::desc::AutoDesc;
+use crate::desc::{AutoDesc, CausticsDesc};
 use crate::film::Image;
 use crate::render::{self, Overrides, RenderResult, Settings, Silent};
 use crate::scene::Scene;
@@ -40,9 +40,10 @@ pub fn render_with(prepared: &Prepared, kind: AccelKind) -> RenderResult {
 
 /// Renders a scene given as JSON through Embree.
 pub fn render(scene: &Value) -> Image {
-    // Estimates take pixels for independent of each other: those that share light paths are not.
+    // Estimates take pixels for independent of each other: those that share light paths or photons are not.
     let bidirectional = Some(AutoDesc::Off);
-    let overrides = Overrides { threads: Some(2), bidirectional, ..Overrides::default() };
+    let caustics = scene["integrator"].get("caustics").is_none().then_some(CausticsDesc::Paths);
+    let overrides = Overrides { threads: Some(2), bidirectional, caustics, ..Overrides::default() };
     render_with(&prepare(scene, &overrides), AccelKind::EMBREE).image
 }
 

@@ -278,10 +278,10 @@ pub struct RenderArgs {
     /// less noise of caustics, but biased. Off by default; 0 for off
     #[arg(long, value_name = "ALPHA", help_heading = "Algorithm")]
     pub regularize: Option<f32>,
-    /// Caustics, the light that mirrors and clear glass throw on other surfaces: paths or photons
+    /// Caustics, the light that mirrors and clear glass throw on other surfaces: auto, paths or photons
     ///
-    /// Photons blur them by up to two pixels, less with more samples, and find those of point and distant lights too.
-    /// Not with --guiding, --guide, --target-error or --regularize. Default: paths
+    /// Photons blur them a little, less with more samples. auto: if a pilot shows that this pays; from 16 samples on.
+    /// photons: of point lights too; not with --guiding, --guide, --target-error or --regularize. Default: auto
     #[arg(long, value_name = "NAME", value_parser = names::plain::<CausticsDesc>(), help_heading = "Algorithm")]
     pub caustics: Option<CausticsDesc>,
     /// Bidirectional path tracing: connect paths to paths from the lights

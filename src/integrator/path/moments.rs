@@ -1,0 +1,82 @@
+//! What pilots learn of the variance that samples would have without connections or photons.
+
+use super::PassContext;
+use crate::color::Rgb;
+use crate::integrator::{EPOCH, PilotMoments};
+
+/// Moments of the samples of a batch.
+#[derive(Default)]
+pub(super) struct Moments {
+    /// By sample; empty where they are not wanted.
+    samples: Vec<PilotMoments>,
+    /// By shadow ray, the mean of the square that a path without connections adds, over that which it adds; empty
+    /// without connections.
+    pub ratios: Vec<f32>,
+    /// Whether the ratios are wanted.
+    pub has_ratios: bool,
+    /// Whether light is wanted that photons have weights against.
+    pub has_chance: bool,
+}
+
+impl Moments {
+    pub fn start(&mut self, pass: &PassContext, samples: usize) {
+        self.has_ratios = pass.light_paths.is_some_and(|light_paths| light_paths.has_moments);
+        self.has_chance = pass.caustics.is_some_and(|caustics| caustics.has_moments);
+        self.samples.clear();
+        if self.has_ratios || self.has_chance {
+            self.samples.resize(samples, PilotMoments::default());
+        }
+    }
+
+    /// By sample; empty where they are not wanted.
+    pub fn samples(&self) -> &[PilotMoments] {
+        &self.samples
+    }
+
+    /// Adds the light of a shadow ray that nothing blocks.
+    #[inline]
+    pub fn add_shadow_ray(&mut self, ray: usize, slot: u32, light: Rgb) {
+        if let (Some(sample), Some(&ratio)) = (self.samples.get_mut(slot as usize), self.ratios.get(ray)) {
+            let more = f64::from(ratio) - 1.0;
+            sample.add(light, |_, square| [0.0, square * more, 0.0]);
+        }
+    }
+
+    /// Adds the light of a photon with this weight by MIS, which paths find by chance with `1 / ratio` of the density.
+    #[inline]
+    pub fn add_photon(&mut self, slot: u32, light: Rgb, weight: f32, ratio: f32) {
+        if let Some(sample) = self.samples.get_mut(slot as usize) {
+            // The square of what chance finds is `(light / weight)^2`, and is found here with `ratio` of the density.
+            let by_chance = f64::from(ratio) / f64::from(weight);
+            if by_chance.is_finite() {
+                // All samples of an epoch gather much the same photons.
+                sample.add(light, |light, square| [-light, square * by_chance, square * f64::from(EPOCH)]);
+            }
+        }
+    }
+
+    /// Adds light that a path has met by chance, weighted against photons, and as it would be without these.
+    #[inline]
+    pub fn add_chance(&mut self, slot: u32, weighted: Rgb, plain: Rgb) {
+        if let Some(sample) = self.samples.get_mut(slot as usize) {
+            let left = 1.0 / f64::from(plain.max_channel() / weighted.max_channel());
+            if left.is_finite() {
+                // Samples show what they find: of its share in the second moment, photons add the rest.
+                sample.add(plain, |light, square| [light * (1.0 - left), -square * (1.0 - left), 0.0]);
+            }
+        }
+    }
+}
+
+impl PilotMoments {
+    /// Adds to each channel what `terms` gives for its light and the square of that.
+    fn add(&mut self, light: Rgb, terms: impl Fn(f64, f64) -> [f64; 3]) {
+        for (k, value) in light.to_array().into_iter().enumerate() {
+            let value = f64::from(value);
+            let [without, excess, shared] = terms(value, value * value);
+            self.without[k] += without;
+            self.excess[k] += excess;
+            self.shared[k] += shared;
+        }
+    }
+}

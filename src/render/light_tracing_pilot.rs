@@ -1,0 +1,96 @@
+//! The pilot of what is traced from the lights: light paths, whose vertices paths are connected to, or photons, which
+//! paths gather. It depends on the scene, the view and the seed alone.
+
+use std::sync::Mutex;
+
+use super::LightTracing;
+use super::pilot_samples::{FIRST_SAMPLE, PilotSamples};
+use super::tile_renderer::{TileRenderer, TileWorkspace};
+use crate::integrator::{EPOCH, Guidance};
+
+/// Samples of a pilot pixel with a method, of one epoch, and without; the latter give the number of rays, and show
+/// where there is no noise.
+const SAMPLES: u32 = EPOCH;
+const PLAIN_SAMPLES: u32 = 2;
+
+/// The least variance of plain paths over the square of the colour, and the least difference of their mean from that
+/// with a method: one of these must be there.
+const LEAST_NOISE: f64 = 1e-4;
+const LEAST_DIFFERENCE: f64 = 0.05;
+
+/// The time of a ray of a path with connections or photons over that of another, connections or gathering included.
+const CONNECTED_RAY_COST: f64 = 1.25;
+const GATHERING_RAY_COST: f64 = 1.25;
+
+/// The part of the pixels, those where a method gains most, that is left out: what rare bright samples seem to gain is
+/// less certain than the deviation shows.
+const LEFT_OUT: f64 = 0.02;
+
+/// How many standard deviations the gain may be less than it seems.
+const CONFIDENCE: f64 = 2.0;
+
+/// A pilot being traced, with samples without any method.
+struct Pilot<'a, 'b> {
+    renderer: &'a mut TileRenderer<'b>,
+    workspaces: &'a [Mutex<TileWorkspace>],
+    plain: PilotSamples,
+}
+
+/// What lowers the error by more than it costs, and by most, of what `renderer` has.
+pub(super) fn choose(renderer: &mut TileRenderer, workspaces: &[Mutex<TileWorkspace>]) -> LightTracing {
+    let (light_paths, caustics) = (renderer.light_paths.take(), renderer.caustics.take());
+    if light_paths.is_none() && caustics.is_none() {
+        return LightTracing::Off;
+    }
+    let plain = trace(renderer, PLAIN_SAMPLES, workspaces);
+    let mut pilot = Pilot { renderer, workspaces, plain };
+    let (mut choice, mut best) = (LightTracing::Off, 1.0);
+    if let Some(light_paths) = &light_paths {
+        pilot.renderer.light_paths = Some(light_paths.for_pilot());
+        let efficiency = pilot.efficiency(CONNECTED_RAY_COST, light_paths.per_pilot_path());
+        if efficiency > best {
+            (choice, best) = (LightTracing::Bidirectional, efficiency);
+        }
+        pilot.renderer.light_paths = None;
+    }
+    if let Some(caustics) = caustics {
+        let per_pilot_photon = caustics.per_pilot_photon();
+        pilot.renderer.caustics = Some(caustics.for_pilot(true));
+        if pilot.efficiency(GATHERING_RAY_COST, per_pilot_photon) > best {
+            choice = LightTracing::Photons;
+        }
+        renderer.caustics = renderer.caustics.take().map(|caustics| caustics.for_pilot(false));
+    }
+    renderer.light_paths = light_paths;
+    choice
+}
+
+impl Pilot<'_, '_> {
+    /// Inverse variance for the time over that of plain paths, at least, with what the renderer has; 0 where plain
+    /// paths have no noise. Of rays from lights, the picture has `light_ray_factor` times as many.
+    fn efficiency(&mut self, ray_cost: f64, light_ray_factor: f64) -> f64 {
+        let light_rays = self.renderer.trace_from_lights(FIRST_SAMPLE, self.workspaces).total() as f64;
+        let samples = trace(self.renderer, SAMPLES, self.workspaces);
+        // They are shared by all samples of an epoch.
+        let shared_by = f64::from(EPOCH) * self.renderer.whole_view().area() as f64;
+        let light_rays = light_rays * light_ray_factor / shared_by;
+        let cost = ray_cost * (samples.rays() + light_rays) / self.plain.rays();
+        let gain = samples.gain(LEFT_OUT);
+        tracing::info!("pilot of light tracing: {gain:?} for {cost:.2} of the time");
+        // Where paths find all light and have hardly any noise, what they add from vertex to vertex cancels out.
+        let have_noise = self.plain.relative_variance() > LEAST_NOISE;
+        let miss_light = (self.plain.mean() / samples.mean() - 1.0).abs() > LEAST_DIFFERENCE;
+        match gain {
+            Some(gain) if have_noise || miss_light => (gain.value - CONFIDENCE * gain.deviation) / cost,
+            _ => 0.0,
+        }
+    }
+}
+
+fn trace(renderer: &TileRenderer, samples: u32, workspaces: &[Mutex<TileWorkspace>]) -> PilotSamples {
+    let render = |samples: &mut dyn Iterator<Item = _>, workspace: &mut TileWorkspace| {
+        renderer.render_samples(samples, Guidance::default(), workspace);
+    };
+    let moments = |workspace: &TileWorkspace| workspace.integrator.pilot_moments().to_vec();
+    PilotSamples::trace(renderer.whole_view(), samples, workspaces, render, moments)
+}
