@@ -132,6 +132,32 @@ FEATURES = {
     ),
     "variance": ("`FilmTile::tracks_variance`", [("src/film/tile.rs", r"self\.moments\.is_some\(\)", "false")]),
     "filters with negative lobes": ("the filter's weight", [("src/film/tile.rs", r"self\.layout\.signed", "false")]),
+    "photons": (
+        "`PassContext::caustics`",
+        [
+            ("src/integrator/path/{wave.rs,trace.rs,scatter.rs,moments.rs}", r"context\.pass\.caustics\.is_some\(\)", "false"),
+            ("src/integrator/path/caustics.rs", r"= context\.pass\.caustics else", "= None::<&Caustics> else"),
+        ],
+    ),
+    "light paths": (
+        "`PassContext::light_paths`",
+        [
+            ("src/integrator/path/{wave.rs,specular_direct.rs}", r"context\.pass\.light_paths\.is_some\(\)", "false"),
+            ("src/integrator/path/mod.rs", r"!wave\.connections\.is_empty\(\)", "false"),
+            ("src/integrator/path/{connection_mis.rs,connections.rs}", r"= context\.pass\.light_paths else", "= None::<&crate::integrator::LightPaths> else"),
+        ],
+    ),
+    "specular reflections of emitters": (
+        "`Context::emitter_prims`",
+        [("src/integrator/path/mod.rs", r"specular_direct::emitters\(config, pass\)", "{ let _ = pass; None::<&EmitterPrims> }")],
+    ),
+    "guiding": (
+        "`Guidance`",
+        [
+            ("src/integrator/path/mod.rs", r"let regions = guide\.map\(\|guide\| Regions::find\(guide, &wave\.vertices\)\);", "let _ = guide; let regions = None::<Regions>;"),
+            ("src/integrator/path/scatter.rs", r"guidance\.learner\.is_some\(\) \|\| guidance\.has_moments", "false && guidance.has_moments"),
+        ],
+    ),
     "clamping": ("the clamp of `path`", [("src/integrator/path/mod.rs", r"self\.clamp == f32::INFINITY \|\|", "true ||")]),
 }
 # What a scene uses it cannot do without.
