@@ -1,6 +1,7 @@
 //! `--guiding auto`: a pilot decides. Where guiding does not pay the picture is that without it bit for bit; where it
 //! pays, the same for any number of threads, resumed anywhere, and with more samples added later.
 
+use std::path::Path;
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
@@ -8,8 +9,9 @@ use serde_json::{Value, json};
 use steradian::desc::AutoDesc;
 use steradian::internal::accel::{self, AccelKind};
 use steradian::internal::film::Image;
+use steradian::internal::import::SceneFingerprint;
 use steradian::internal::math::Rng;
-use steradian::internal::render::{self, Overrides, RenderState, Shard, StateFile};
+use steradian::internal::render::{self, Overrides, RenderProvenance, RenderState, Settings, Shard, StateFile, Stats};
 
 use crate::checkpoints::{Kit, StopAfter, bits};
 use crate::guiding::room_with_shaft;
@@ -219,4 +221,30 @@ fn crops_have_pilots_of_their_own() {
     let image = crop(2);
     assert_eq!(image.crop.area(), 71 * 67);
     assert!(image == crop(1));
+}
+
+/// What trains guides depends on the samples that a picture is to have, not on those that it got.
+#[test]
+fn pictures_that_ended_early_are_repeated() {
+    for guiding in [AutoDesc::Auto, AutoDesc::On] {
+        let mut kit = kit(&hard(), guiding, 2 * SPP);
+        let stop = AtomicBool::new(false);
+        // Of nine tiles.
+        let progress = StopAfter { tiles: (9 * 70).into(), stop: &stop };
+        let state = kit.go_on(kit.start(Shard::WHOLE), &progress, &stop);
+        assert!((16..SPP).contains(&state.done), "{}", state.done);
+        let early = state.picture(&kit.prepared.settings);
+
+        let provenance = RenderProvenance::new(
+            Path::new("test.json"),
+            SceneFingerprint::default(),
+            &kit.prepared.settings,
+            Vec::new(),
+        );
+        let provenance = provenance.of_render(&Stats { spp_done: state.done, ..Stats::default() });
+        let layers = kit.prepared.settings.layers;
+        kit.prepared.settings = Settings { layers, ..provenance.settings(2) };
+        let again = kit.render(Shard::WHOLE);
+        assert!(again.done == state.done && again.picture(&kit.prepared.settings) == early, "{guiding:?}");
+    }
 }

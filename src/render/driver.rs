@@ -162,7 +162,7 @@ impl Driver<'_> {
     }
 
     fn render_pass(&self, state: &mut RenderState, pass: &Pass) -> RayCounts {
-        let (tiles, samples) = state.work_of(pass, self.session.settings.spp);
+        let (tiles, samples) = state.work_of(pass, self.session.settings.planned_spp());
         let render_tile = |tile: &mut FilmTile| {
             let thread = rayon::current_thread_index().unwrap_or(0);
             let mut workspace = self.workspaces[thread].lock().unwrap_or_else(PoisonError::into_inner);

@@ -94,7 +94,8 @@ impl RenderProvenance {
         if self.settings.light_tracing().is_none() {
             self.settings.light_tracing = Some(stats.light_tracing);
         }
-        if self.settings.target_error.is_none() {
+        if self.settings.target_error.is_none() && stats.spp_done < self.settings.spp {
+            self.settings.planned_spp.get_or_insert(self.settings.spp);
             self.settings.spp = stats.spp_done;
         }
         self
@@ -183,6 +184,7 @@ impl RenderProvenance {
         require(crop.fits(film), "settings.crop", "must have an area and lie within the picture")?;
         require(overscan == 0 || crop == Crop::full(film), "settings.crop", "must be all of a picture with overscan")?;
         require(spp > 0, "settings.spp", "must be at least 1")?;
+        require(self.settings.planned_spp() >= spp, "settings.planned_spp", "must be at least spp")?;
         require(
             target_error.is_none_or(|error| error > 0.0 && error.is_finite()),
             "settings.target_error",

@@ -65,6 +65,10 @@ pub struct Settings {
     pub sampler: SamplerKind,
     /// Samples per pixel; with a target error the most that a pixel gets.
     pub spp: u32,
+    /// Those that the picture was to have, if its render ended with fewer: pilots, training and texture filtering go by
+    /// them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub planned_spp: Option<u32>,
     /// The relative squared error that the picture is to stay below; samples then go where they are needed.
     pub target_error: Option<f64>,
     /// A different seed gives different noise.
@@ -121,6 +125,7 @@ impl Settings {
             } else {
                 desc.sampler.spp
             }),
+            planned_spp: None,
             target_error: target_error(overrides)?,
             seed: overrides.seed.unwrap_or(desc.sampler.seed),
             integrator,
@@ -135,12 +140,17 @@ impl Settings {
         })
     }
 
+    /// Samples per pixel that the picture was to have from the start.
+    pub fn planned_spp(&self) -> u32 {
+        self.planned_spp.unwrap_or(self.spp)
+    }
+
     /// What is traced from the lights: `None` if a pilot decides.
     pub fn light_tracing(&self) -> Option<LightTracing> {
         let IntegratorDesc::Path { caustics, bidirectional, max_depth, .. } = self.integrator else {
             return Some(LightTracing::Off);
         };
-        let has_pilot = self.spp >= LEAST_LIGHT_TRACING_SPP && max_depth >= LEAST_LIGHT_TRACING_DEPTH;
+        let has_pilot = self.planned_spp() >= LEAST_LIGHT_TRACING_SPP && max_depth >= LEAST_LIGHT_TRACING_DEPTH;
         self.light_tracing.or(match (caustics, bidirectional) {
             (CausticsDesc::Photons, _) => Some(LightTracing::Photons),
             (_, AutoDesc::On) => Some(LightTracing::Bidirectional),
@@ -186,8 +196,8 @@ impl Settings {
 
     /// Whether a pilot decides if paths are guided.
     pub fn has_guiding_pilot(&self) -> bool {
-        let samples = self.crop.area() * u64::from(self.spp);
-        self.allows_guiding_pilot() && self.spp >= LEAST_GUIDED_SPP && samples >= LEAST_GUIDED_SAMPLES
+        let samples = self.crop.area() * u64::from(self.planned_spp());
+        self.allows_guiding_pilot() && self.planned_spp() >= LEAST_GUIDED_SPP && samples >= LEAST_GUIDED_SAMPLES
     }
 
     /// Whether a pilot decides where there are enough samples.

@@ -117,8 +117,10 @@ impl<'a> TileRenderer<'a> {
             by_scattering: settings.layers.needs_light_aovs(),
             light_groups: if has(LayerKind::LightGroups) { shape.light_groups.len() as u32 } else { 0 },
         };
-        let (world, context) =
-            (World::new(scene, accel), RenderContext::new(scene, settings.size, settings.spp.min(FINEST_SPP)));
+        let (world, context) = (
+            World::new(scene, accel),
+            RenderContext::new(scene, settings.size, settings.planned_spp().min(FINEST_SPP)),
+        );
         // Analytic shapes have their parameters only with the whole parametrisation.
         let in_full = settings.integrator == IntegratorDesc::Uv || (surface_aovs.uv && scene.features.analytic_shapes);
         Self {

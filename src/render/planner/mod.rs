@@ -190,7 +190,7 @@ impl RenderState {
             Planner::Guided(planner) => {
                 planner.rays = planner.rays.saturating_add(rays.total());
                 if self.tiles_in_partial_pass == 0 {
-                    planner.complete_samples(&mut self.film, self.done, session.settings.spp);
+                    planner.complete_samples(&mut self.film, self.done, session.settings.planned_spp());
                 }
             }
             Planner::Pilot(planner) if self.tiles_in_partial_pass == 0 => planner.complete_samples(self.done),

@@ -226,7 +226,7 @@ fn compared(settings: &Settings, scene: &Scene) -> BTreeMap<String, String> {
     if scene.features.filtered_textures {
         found.insert(
             "samples per pixel that textures are filtered for".to_owned(),
-            settings.spp.min(FINEST_SPP).to_string(),
+            settings.planned_spp().min(FINEST_SPP).to_string(),
         );
     }
     found
