@@ -65,8 +65,8 @@ impl RenderSession<'_> {
         let stats = driver.run(&mut state);
         self.check_time(&stats, state.done)?;
         let (nan_samples, dropped) = state.dropped();
-        let (rays, spp_done, render_seconds) = (state.rays, state.done, state.seconds);
-        Ok((state, Stats { render_seconds, rays, spp_done, nan_samples, dropped, ..stats }))
+        let (rays, spp_done, render_seconds, is_uneven) = (state.rays, state.done, state.seconds, state.torn);
+        Ok((state, Stats { render_seconds, rays, spp_done, nan_samples, dropped, is_uneven, ..stats }))
     }
 
     /// An error for a render without a picture when its time is over.

@@ -85,6 +85,8 @@ pub struct Stats {
     pub interrupted: bool,
     /// Whether the time limit ended the render.
     pub time_limited: bool,
+    /// Whether the last pass was cancelled: some tiles have samples that others lack.
+    pub is_uneven: bool,
 }
 
 /// A picture with its statistics.

@@ -36,7 +36,14 @@ pub fn run(arguments: &RerenderArgs, mut uses: FileUses) -> Result<u8> {
         ..like
             .unwrap_or_else(|| OutputDesc { view: Some(provenance.settings.integrator.view()), ..OutputDesc::new("") })
     });
-    provenance.settings.spp = arguments.spp.unwrap_or(provenance.settings.spp);
+    if let Some(spp) = arguments.spp {
+        (provenance.settings.spp, provenance.settings.planned_spp) = (spp, None);
+    } else if provenance.ended_early {
+        tracing::warn!(
+            "{}: its render was ended within a pass or before its target error; the new picture has other samples",
+            file.display()
+        );
+    }
     if provenance.settings.spp == 0 {
         return Err(Error::Usage("--spp 0: a picture needs at least one sample per pixel".into()));
     }
