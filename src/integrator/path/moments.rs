@@ -61,7 +61,7 @@ impl Moments {
         if let Some(sample) = self.samples.get_mut(slot as usize) {
             let left = 1.0 / f64::from(plain.max_channel() / weighted.max_channel());
             if left.is_finite() {
-                // Samples show what they find: of its share in the second moment, photons add the rest.
+                // Photons account for this share of its square, which the samples without them show again.
                 sample.add(plain, |light, square| [light * (1.0 - left), -square * (1.0 - left), 0.0]);
             }
         }
