@@ -135,14 +135,14 @@ FEATURES = {
     "photons": (
         "`PassContext::caustics`",
         [
-            ("src/integrator/path/{wave.rs,trace.rs,scatter.rs,moments.rs}", r"context\.pass\.caustics\.is_some\(\)", "false"),
+            ("src/integrator/path/wave.rs", r"context\.pass\.caustics\.is_some\(\)", "false"),
             ("src/integrator/path/caustics.rs", r"= context\.pass\.caustics else", "= None::<&Caustics> else"),
         ],
     ),
     "light paths": (
         "`PassContext::light_paths`",
         [
-            ("src/integrator/path/{wave.rs,specular_direct.rs}", r"context\.pass\.light_paths\.is_some\(\)", "false"),
+            ("src/integrator/path/wave.rs", r"context\.pass\.light_paths\.is_some\(\)", "false"),
             ("src/integrator/path/mod.rs", r"!wave\.connections\.is_empty\(\)", "false"),
             ("src/integrator/path/{connection_mis.rs,connections.rs}", r"= context\.pass\.light_paths else", "= None::<&crate::integrator::LightPaths> else"),
         ],

@@ -75,8 +75,8 @@ fn without_outputs_the_files_are_named_after_the_scene() {
     let stats: Value =
         serde_json::from_str(&std::fs::read_to_string(folder.path().join("stats.json")).unwrap()).unwrap();
     assert_eq!(
-        (&stats["samples"], &stats["spp"], &stats["interrupted"]),
-        (&Value::from(24 * 16 * 2), &Value::from(2), &Value::from(false))
+        (&stats["samples"], &stats["spp"], &stats["interrupted"], &stats["light_tracing"]),
+        (&Value::from(24 * 16 * 2), &Value::from(2), &Value::from(false), &Value::from("off"))
     );
     for key in [
         "load_seconds",

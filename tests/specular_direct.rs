@@ -61,7 +61,7 @@ fn evaluated_and_chosen_reflections_have_the_same_mean() {
 
 /// Two renders differ by twice the variance of one; the layers hold the same light.
 #[test]
-fn evaluated_reflections_have_less_noise_in_the_layer_of_direct_specular_direct() {
+fn evaluated_reflections_have_less_noise_in_the_layer_of_direct_specular_light() {
     let layer = |image: &Image, kind| -> Vec<f64> {
         image.layer(kind).unwrap().data.iter().map(|&value| f64::from(value)).collect()
     };

@@ -65,7 +65,7 @@ impl RenderSession<'_> {
         let stats = driver.run(&mut state);
         self.check_time(&stats, state.done)?;
         let (nan_samples, dropped) = state.dropped();
-        let (rays, spp_done, render_seconds, is_uneven) = (state.rays, state.done, state.seconds, state.torn);
+        let (rays, spp_done, render_seconds, is_uneven) = (state.rays, state.done, state.seconds, state.is_uneven);
         Ok((state, Stats { render_seconds, rays, spp_done, nan_samples, dropped, is_uneven, ..stats }))
     }
 
@@ -215,7 +215,7 @@ impl Driver<'_> {
     /// After the last pass.
     fn finish(&mut self, state: &mut RenderState) {
         let (progress, elapsed) = (self.session.progress, self.start.elapsed());
-        if let Some(checkpoints) = self.checkpoints.as_mut().filter(|_| !state.torn) {
+        if let Some(checkpoints) = self.checkpoints.as_mut().filter(|_| !state.is_uneven) {
             self.pool.install(|| checkpoints.finish(state, elapsed, progress));
         }
         state.seconds += elapsed.as_secs_f64();

@@ -11,16 +11,15 @@ use crate::integrator::{EPOCH, Guidance};
 /// Samples of a pilot pixel with a method, of one epoch, and without; the latter give the number of rays, and show
 /// where there is no noise.
 const SAMPLES: u32 = EPOCH;
-const PLAIN_SAMPLES: u32 = 2;
+const UNIDIRECTIONAL_SAMPLES: u32 = 2;
 
-/// The least variance of plain paths over the square of the colour, and the least difference of their mean from that
-/// with a method: one of these must be there.
+/// The least variance of unidirectional paths over the square of the colour, and the least difference of their mean
+/// from that with a method: one of these must be there.
 const LEAST_NOISE: f64 = 1e-4;
 const LEAST_DIFFERENCE: f64 = 0.05;
 
 /// The time of a ray of a path with connections or photons over that of another, connections or gathering included.
-const CONNECTED_RAY_COST: f64 = 1.25;
-const GATHERING_RAY_COST: f64 = 1.25;
+const RAY_COST: f64 = 1.25;
 
 /// The part of the pixels, those where a method gains most, that is left out: what rare bright samples seem to gain is
 /// less certain than the deviation shows.
@@ -33,7 +32,7 @@ const CONFIDENCE: f64 = 2.0;
 struct Pilot<'a, 'b> {
     renderer: &'a mut TileRenderer<'b>,
     workspaces: &'a [Mutex<TileWorkspace>],
-    plain: PilotSamples,
+    unidirectional: PilotSamples,
 }
 
 /// What lowers the error by more than it costs, and by most, of what `renderer` has.
@@ -42,12 +41,12 @@ pub(super) fn choose(renderer: &mut TileRenderer, workspaces: &[Mutex<TileWorksp
     if light_paths.is_none() && caustics.is_none() {
         return LightTracing::Off;
     }
-    let plain = trace(renderer, PLAIN_SAMPLES, workspaces);
-    let mut pilot = Pilot { renderer, workspaces, plain };
+    let unidirectional = trace(renderer, UNIDIRECTIONAL_SAMPLES, workspaces);
+    let mut pilot = Pilot { renderer, workspaces, unidirectional };
     let (mut choice, mut best) = (LightTracing::Off, 1.0);
     if let Some(light_paths) = &light_paths {
         pilot.renderer.light_paths = Some(light_paths.for_pilot());
-        let efficiency = pilot.efficiency(CONNECTED_RAY_COST, light_paths.per_pilot_path());
+        let efficiency = pilot.efficiency(light_paths.per_pilot_path());
         if efficiency > best {
             (choice, best) = (LightTracing::Bidirectional, efficiency);
         }
@@ -56,7 +55,7 @@ pub(super) fn choose(renderer: &mut TileRenderer, workspaces: &[Mutex<TileWorksp
     if let Some(caustics) = caustics {
         let per_pilot_photon = caustics.per_pilot_photon();
         pilot.renderer.caustics = Some(caustics.for_pilot(true));
-        if pilot.efficiency(GATHERING_RAY_COST, per_pilot_photon) > best {
+        if pilot.efficiency(per_pilot_photon) > best {
             choice = LightTracing::Photons;
         }
         renderer.caustics = renderer.caustics.take().map(|caustics| caustics.for_pilot(false));
@@ -66,20 +65,20 @@ pub(super) fn choose(renderer: &mut TileRenderer, workspaces: &[Mutex<TileWorksp
 }
 
 impl Pilot<'_, '_> {
-    /// Inverse variance for the time over that of plain paths, at least, with what the renderer has; 0 where plain
-    /// paths have no noise. Of rays from lights, the picture has `light_ray_factor` times as many.
-    fn efficiency(&mut self, ray_cost: f64, light_ray_factor: f64) -> f64 {
+    /// Inverse variance for the time over that of unidirectional paths, at least, with what the renderer has; 0 where
+    /// these have no noise. Of rays from lights, the picture has `light_ray_factor` times as many.
+    fn efficiency(&mut self, light_ray_factor: f64) -> f64 {
         let light_rays = self.renderer.trace_from_lights(FIRST_SAMPLE, self.workspaces).total() as f64;
         let samples = trace(self.renderer, SAMPLES, self.workspaces);
         // They are shared by all samples of an epoch.
         let shared_by = f64::from(EPOCH) * self.renderer.whole_view().area() as f64;
         let light_rays = light_rays * light_ray_factor / shared_by;
-        let cost = ray_cost * (samples.rays() + light_rays) / self.plain.rays();
+        let cost = RAY_COST * (samples.rays() + light_rays) / self.unidirectional.rays();
         let gain = samples.gain(LEFT_OUT);
         tracing::info!("pilot of light tracing: {gain:?} for {cost:.2} of the time");
         // Where paths find all light and have hardly any noise, what they add from vertex to vertex cancels out.
-        let have_noise = self.plain.relative_variance() > LEAST_NOISE;
-        let miss_light = (self.plain.mean() / samples.mean() - 1.0).abs() > LEAST_DIFFERENCE;
+        let have_noise = self.unidirectional.relative_variance() > LEAST_NOISE;
+        let miss_light = (self.unidirectional.mean() / samples.mean() - 1.0).abs() > LEAST_DIFFERENCE;
         match gain {
             Some(gain) if have_noise || miss_light => (gain.value - CONFIDENCE * gain.deviation) / cost,
             _ => 0.0,

@@ -54,7 +54,7 @@ pub struct RenderProvenance {
     /// Whether a repeated render ends with other samples: after one that was ended within a pass, or before its target
     /// error.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub ended_early: bool,
+    pub unrepeatable: bool,
     /// Whether the picture was denoised, with the denoiser's own defaults.
     #[serde(default)]
     pub denoise: bool,
@@ -87,7 +87,7 @@ impl RenderProvenance {
             allow_missing: false,
             frame: None,
             settings: settings.clone(),
-            ended_early: false,
+            unrepeatable: false,
             denoise: false,
             output: None,
         }
@@ -100,7 +100,7 @@ impl RenderProvenance {
             self.settings.light_tracing = Some(stats.light_tracing);
         }
         let has_target = self.settings.target_error.is_some();
-        self.ended_early = stats.is_uneven || (has_target && (stats.interrupted || stats.time_limited));
+        self.unrepeatable = stats.is_uneven || (has_target && (stats.interrupted || stats.time_limited));
         if !has_target && stats.spp_done < self.settings.spp {
             self.settings.planned_spp.get_or_insert(self.settings.spp);
             self.settings.spp = stats.spp_done;
@@ -379,14 +379,16 @@ mod tests {
     #[test]
     fn what_cannot_be_repeated_is_marked() {
         let recipe = RenderProvenance::from_value(provenance(), Path::new("a.exr")).unwrap();
-        let ended_early = |stats: Stats, target_error| {
+        let unrepeatable = |stats: Stats, target_error| {
             let settings = Settings { target_error, ..recipe.settings.clone() };
             let value = RenderProvenance { settings, ..recipe.clone() }.of_render(&stats).to_value();
-            RenderProvenance::from_value(value, Path::new("a.exr")).unwrap().ended_early
+            RenderProvenance::from_value(value, Path::new("a.exr")).unwrap().unrepeatable
         };
         let stats = Stats { spp_done: 3, ..Stats::default() };
-        assert!(!ended_early(Stats { time_limited: true, ..stats.clone() }, None));
-        assert!(ended_early(Stats { is_uneven: true, ..stats.clone() }, None));
-        assert!(!ended_early(stats.clone(), Some(0.1)) && ended_early(Stats { interrupted: true, ..stats }, Some(0.1)));
+        assert!(!unrepeatable(Stats { time_limited: true, ..stats.clone() }, None));
+        assert!(unrepeatable(Stats { is_uneven: true, ..stats.clone() }, None));
+        assert!(
+            !unrepeatable(stats.clone(), Some(0.1)) && unrepeatable(Stats { interrupted: true, ..stats }, Some(0.1))
+        );
     }
 }

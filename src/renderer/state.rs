@@ -85,7 +85,7 @@ impl StateFiles {
         let (state, stats) = session.render(state, checkpoints.as_mut())?;
         // What an interrupted shard has is in its checkpoint; a shard that is there is complete.
         let unfinished = stats.interrupted && checkpoints.is_some();
-        if state.torn && self.shard_file.is_some() && !unfinished {
+        if state.is_uneven && self.shard_file.is_some() && !unfinished {
             let message = "the pass under way took too long and was cancelled";
             if !stats.interrupted {
                 return Err(refused("time_limit", format!(": {message}, so there is no shard")));

@@ -32,6 +32,7 @@ impl Rendering {
             "nan_samples": stats.nan_samples,
             "interrupted": stats.interrupted,
             "time_limited": stats.time_limited,
+            "light_tracing": stats.light_tracing,
             "outputs": settings.outputs.iter().map(|output| output.file.as_str()).collect::<Vec<_>>(),
             "denoise": self.denoised.as_ref().map_or(Value::Null, Denoised::statistics),
         })

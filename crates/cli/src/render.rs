@@ -10,7 +10,9 @@ use steradian::internal::compile::CheckedScene;
 use steradian::internal::farm::check_single_name;
 use steradian::internal::live::{Fan, Live};
 use steradian::internal::output;
-use steradian::internal::render::{self, Progress, RenderProvenance, Replayed, Settings, Stats, TrainedGuide};
+use steradian::internal::render::{
+    self, LightTracing, Progress, RenderProvenance, Replayed, Settings, Stats, TrainedGuide,
+};
 use steradian::{
     PreparedRender, Renderer, Rendering, Result, StateOptions, StopHandle, Watch, changed_settings, default_outputs,
 };
@@ -259,6 +261,11 @@ fn report(reporter: &Reporter, rendering: &Rendering, written: &[String]) {
         counted(settings.threads as u64, "thread"),
         rendering.accelerator(),
     ));
+    match stats.light_tracing {
+        LightTracing::Off => {}
+        LightTracing::Photons => reporter.say("caustics by photons"),
+        LightTracing::Bidirectional => reporter.say("bidirectional paths"),
+    }
     if let (Some(error), Some(target)) = (stats.estimated_error, settings.target_error) {
         reporter.say(&format!("relative squared error about {error:.3e}, target {target:.3e}"));
     }

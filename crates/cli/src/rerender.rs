@@ -38,7 +38,7 @@ pub fn run(arguments: &RerenderArgs, mut uses: FileUses) -> Result<u8> {
     });
     if let Some(spp) = arguments.spp {
         (provenance.settings.spp, provenance.settings.planned_spp) = (spp, None);
-    } else if provenance.ended_early {
+    } else if provenance.unrepeatable {
         tracing::warn!(
             "{}: its render was ended within a pass or before its target error; the new picture has other samples",
             file.display()

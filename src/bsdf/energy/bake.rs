@@ -7,7 +7,7 @@ use super::super::principled::shapes::{self, ClearCoat};
 use super::super::{Ggx, SMOOTH_ALPHA};
 use super::table::{
     ALPHAS, ASPECTS, Block, CLEAR_COAT, COAT, COAT_AVERAGE, COAT_NODES, COSINES, DIFFUSE, GLASS, GLASS_AVERAGE, IORS,
-    MAX_IOR, MIXED_SPECULAR, MIXED_SPECULAR_AVERAGE, SCHLICK, SHAPES, SHEEN, TableCoordinate, across, cosine_axis,
+    MAX_IOR, REFLECTION, REFLECTION_AVERAGE, SCHLICK, SHAPES, SHEEN, TableCoordinate, across, cosine_axis,
     schlick_weight, smoothed,
 };
 use crate::math::{Vec3, sin_cos_turns, vec3};
@@ -24,8 +24,8 @@ enum TableValue {
 
 /// The blocks in the order of the file.
 const SOURCES: [(Block, TableValue); 10] = [
-    (MIXED_SPECULAR, TableValue::Number(mirrors)),
-    (MIXED_SPECULAR_AVERAGE, TableValue::BlockBefore(mirrors_average)),
+    (REFLECTION, TableValue::Number(reflection)),
+    (REFLECTION_AVERAGE, TableValue::BlockBefore(reflection_average)),
     (SCHLICK, TableValue::Number(schlick)),
     (GLASS, TableValue::Number(glass)),
     (GLASS_AVERAGE, TableValue::BlockBefore(glass_average)),
@@ -64,7 +64,7 @@ fn places<const N: usize>(mut entry: usize, counts: [usize; N]) -> [usize; N] {
     places
 }
 
-fn mirrors(entry: usize) -> f32 {
+fn reflection(entry: usize) -> f32 {
     let [aspect, axis, alpha, cos] = places(entry, [ASPECTS, 2, ALPHAS, COSINES]);
     let alpha = node_alpha(alpha);
     let (minor, cos) = (minor_alpha(alpha, aspect), node_cosine(alpha, cos));
@@ -74,9 +74,9 @@ fn mirrors(entry: usize) -> f32 {
     mean_of_facets([alpha, minor], direction((1.0 + tangent * tangent).sqrt().recip(), turns), |facet| facet.shadowing)
 }
 
-fn mirrors_average(entry: usize, mirrors: &[f32]) -> f32 {
+fn reflection_average(entry: usize, reflection: &[f32]) -> f32 {
     let [aspect, alpha] = places(entry, [ASPECTS, ALPHAS]);
-    root_of_rest(average_of_mirrors(mirrors, aspect, alpha, node_alpha(alpha)))
+    root_of_rest(average_of_reflection(reflection, aspect, alpha, node_alpha(alpha)))
 }
 
 /// Of Schlick's weight.
@@ -259,11 +259,11 @@ fn average(alpha: f32, row: &[f32]) -> f32 {
     1.0 - cosines().map(|(cos, weight)| weight * f64::from(1.0 - between(row, alpha, cos))).sum::<f64>() as f32
 }
 
-/// Mean over all directions of the table of mirrors at one node of aspect and alpha, as it is read.
-fn average_of_mirrors(mirrors: &[f32], aspect: usize, node: usize, alpha: f32) -> f32 {
+/// Mean over all directions of the table of reflection at one node of aspect and alpha, as it is read.
+fn average_of_reflection(reflection: &[f32], aspect: usize, node: usize, alpha: f32) -> f32 {
     const AZIMUTHS: usize = 32;
     let minor = minor_alpha(alpha, aspect);
-    let rows = [0, 1].map(|axis| &mirrors[((2 * aspect + axis) * ALPHAS + node) * COSINES..]);
+    let rows = [0, 1].map(|axis| &reflection[((2 * aspect + axis) * ALPHAS + node) * COSINES..]);
     let mut lost = 0.0;
     for (cos, weight) in cosines() {
         for azimuth in 0..AZIMUTHS {

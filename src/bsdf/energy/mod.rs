@@ -24,7 +24,7 @@ use crate::math::Vec3;
 pub(super) use table::schlick_weight;
 use table::{
     ALPHAS, ASPECTS, CLEAR_COAT, COAT, COAT_AVERAGE, COAT_NODES, COSINES, DIFFUSE, GLASS, GLASS_AVERAGE, IORS,
-    MIXED_SPECULAR, MIXED_SPECULAR_AVERAGE, SCHLICK, SHAPES, SHEEN, TableCoordinate, across, smoothed,
+    REFLECTION, REFLECTION_AVERAGE, SCHLICK, SHAPES, SHEEN, TableCoordinate, across, smoothed,
 };
 
 /// A smaller loss under diffuse light counts as none.
@@ -83,11 +83,11 @@ impl Energy {
         }
     }
 
-    /// [`MIXED_SPECULAR`] at a node along the aspect, above one of the axes.
+    /// [`REFLECTION`] at a node along the aspect, above one of the axes.
     #[inline(always)]
-    fn mirrors(&self, aspect: usize, axis: usize, cosine: TableCoordinate) -> f32 {
+    fn single_reflection(&self, aspect: usize, axis: usize, cosine: TableCoordinate) -> f32 {
         const AXIS: usize = ALPHAS * COSINES;
-        MIXED_SPECULAR.bilinear_from((2 * aspect + axis) * AXIS, COSINES, self.at_alpha, cosine)
+        REFLECTION.bilinear_from((2 * aspect + axis) * AXIS, COSINES, self.at_alpha, cosine)
     }
 
     /// The albedo of perfectly reflecting microfacets.
@@ -95,12 +95,14 @@ impl Energy {
     pub fn directional_albedo(&self, w: Vec3) -> f32 {
         let coordinates = self.coordinates(w);
         if self.aspect == 1.0 {
-            return self.mirrors(ASPECTS - 1, 0, coordinates.cosine);
+            return self.single_reflection(ASPECTS - 1, 0, coordinates.cosine);
         }
         let at = TableCoordinate::new(self.aspect.sqrt(), ASPECTS);
         let of = |axis: usize| {
-            let (before, after) =
-                (self.mirrors(at.node, axis, coordinates.cosine), self.mirrors(at.node + 1, axis, coordinates.cosine));
+            let (before, after) = (
+                self.single_reflection(at.node, axis, coordinates.cosine),
+                self.single_reflection(at.node + 1, axis, coordinates.cosine),
+            );
             before + (after - before) * at.part
         };
         let (along, across) = (of(0), of(1));
@@ -109,7 +111,7 @@ impl Energy {
 
     /// 1 minus the mean of [`Energy::directional_albedo`] under diffuse light.
     pub fn average_missing_energy(&self) -> f32 {
-        let missing = MIXED_SPECULAR_AVERAGE
+        let missing = REFLECTION_AVERAGE
             .bilinear_square(0, ALPHAS, TableCoordinate::new(self.aspect.sqrt(), ASPECTS), self.at_alpha)
             .max(MIN_LOST);
         // Between the axes of anisotropic microfacets the table is interpolated: rather a hundredth of the lobe too

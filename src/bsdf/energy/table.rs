@@ -110,11 +110,11 @@ impl Block {
 }
 
 /// Single-scattering albedo of microfacets that reflect all: aspect, axis above which the direction is, alpha, cosine.
-pub const MIXED_SPECULAR: Block = Block::new(0, ASPECTS * 2 * ALPHAS * COSINES, 0.0, 1.0);
+pub const REFLECTION: Block = Block::new(0, ASPECTS * 2 * ALPHAS * COSINES, 0.0, 1.0);
 /// Square root of what its mean under diffuse light lacks of 1: aspect, alpha.
-pub const MIXED_SPECULAR_AVERAGE: Block = Block::new(MIXED_SPECULAR.end(), ASPECTS * ALPHAS, 0.0, 1.0);
+pub const REFLECTION_AVERAGE: Block = Block::new(REFLECTION.end(), ASPECTS * ALPHAS, 0.0, 1.0);
 /// The same for microfacets that reflect `(1 - cos)^5`, less that of [`smoothed`] `cos`: alpha, cosine.
-pub const SCHLICK: Block = Block::new(MIXED_SPECULAR_AVERAGE.end(), ALPHAS * COSINES, -1.0, 1.0);
+pub const SCHLICK: Block = Block::new(REFLECTION_AVERAGE.end(), ALPHAS * COSINES, -1.0, 1.0);
 /// What dielectric microfacets reflect and refract together: seen from outside or inside, alpha, index, cosine.
 pub const GLASS: Block = Block::new(SCHLICK.end(), 2 * ALPHAS * IORS * COSINES, 0.0, 1.0);
 /// Square root of what its mean lacks of 1: seen from outside or inside, alpha, index.

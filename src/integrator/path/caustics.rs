@@ -100,11 +100,11 @@ pub(super) fn gather(context: &Context, wave: &mut Wave, block: usize, out: &mut
 
 /// What a vertex scatters of a photon's light.
 struct Scattered {
-    /// Radiance, weighted by MIS against finding it by chance.
+    /// Radiance, weighted by MIS against BSDF sampling.
     light: Rgb,
     /// That weight.
     weight: f32,
-    /// The density of photons over that of finding it by chance.
+    /// The density of photons over that of BSDF sampling.
     density_ratio: f32,
 }
 

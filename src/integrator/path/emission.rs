@@ -60,9 +60,10 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
             continue;
         }
         out.add(paths.slot[i], light);
-        if moments.has_chance && paths.is_specular(i) {
-            let plain = Met { caustic: None, ..met }.emitted(context, &at).map_or(Rgb::BLACK, |(_, radiance)| radiance);
-            moments.add_chance(paths.slot[i], light, paths.throughput.get(i) * plain);
+        if moments.needs_emission && paths.is_specular(i) {
+            let unweighted =
+                Met { caustic: None, ..met }.emitted(context, &at).map_or(Rgb::BLACK, |(_, radiance)| radiance);
+            moments.add_emission(paths.slot[i], light, paths.throughput.get(i) * unweighted);
         }
         if context.config.needs_light_aovs() {
             let event = light_aovs.event(context.bounce, block * BATCH + i, LightEvent::Emission);

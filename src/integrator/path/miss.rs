@@ -52,9 +52,9 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
             }
             let light = context.config.clamped(paths.throughput.get(i) * miss.radiance(context), context.bounce);
             out.add(slot, light);
-            if moments.has_chance && paths.is_specular(i) {
-                let plain = Miss { caustic: None, ..miss }.radiance(context);
-                moments.add_chance(slot, light, paths.throughput.get(i) * plain);
+            if moments.needs_emission && paths.is_specular(i) {
+                let unweighted = Miss { caustic: None, ..miss }.radiance(context);
+                moments.add_emission(slot, light, paths.throughput.get(i) * unweighted);
             }
             if context.config.needs_light_aovs() {
                 let event = light_aovs.event(context.bounce, block * BATCH + i, LightEvent::Environment);

@@ -14,16 +14,16 @@ pub(super) struct Moments {
     pub ratios: Vec<f32>,
     /// Whether the ratios are wanted.
     pub has_ratios: bool,
-    /// Whether light is wanted that photons have weights against.
-    pub has_chance: bool,
+    /// Whether emission is wanted that is weighted against photons.
+    pub needs_emission: bool,
 }
 
 impl Moments {
     pub fn start(&mut self, pass: &PassContext, samples: usize) {
         self.has_ratios = pass.light_paths.is_some_and(|light_paths| light_paths.has_moments);
-        self.has_chance = pass.caustics.is_some_and(|caustics| caustics.has_moments);
+        self.needs_emission = pass.caustics.is_some_and(|caustics| caustics.has_moments);
         self.samples.clear();
-        if self.has_ratios || self.has_chance {
+        if self.has_ratios || self.needs_emission {
             self.samples.resize(samples, PilotMoments::default());
         }
     }
@@ -42,27 +42,27 @@ impl Moments {
         }
     }
 
-    /// Adds the light of a photon with this weight by MIS, which paths find by chance with `1 / ratio` of the density.
+    /// Adds the light of a photon with this weight by MIS, which BSDF sampling finds with `1 / ratio` of the density.
     #[inline]
     pub fn add_photon(&mut self, slot: u32, light: Rgb, weight: f32, ratio: f32) {
         if let Some(sample) = self.samples.get_mut(slot as usize) {
-            // The square of what chance finds is `(light / weight)^2`, and is found here with `ratio` of the density.
-            let by_chance = f64::from(ratio) / f64::from(weight);
-            if by_chance.is_finite() {
+            // The square of what BSDF sampling finds is `(light / weight)^2`, found here with `ratio` of the density.
+            let by_bsdf = f64::from(ratio) / f64::from(weight);
+            if by_bsdf.is_finite() {
                 // All samples of an epoch gather much the same photons.
-                sample.add(light, |light, square| [-light, square * by_chance, square * f64::from(EPOCH)]);
+                sample.add(light, |light, square| [-light, square * by_bsdf, square * f64::from(EPOCH)]);
             }
         }
     }
 
-    /// Adds light that a path has met by chance, weighted against photons, and as it would be without these.
+    /// Adds emission that a path has met, weighted against photons and not.
     #[inline]
-    pub fn add_chance(&mut self, slot: u32, weighted: Rgb, plain: Rgb) {
+    pub fn add_emission(&mut self, slot: u32, weighted: Rgb, unweighted: Rgb) {
         if let Some(sample) = self.samples.get_mut(slot as usize) {
-            let left = 1.0 / f64::from(plain.max_channel() / weighted.max_channel());
-            if left.is_finite() {
+            let weight = f64::from(weighted.max_channel()) / f64::from(unweighted.max_channel());
+            if weight.is_finite() {
                 // Photons account for this share of its square, which the samples without them show again.
-                sample.add(plain, |light, square| [light * (1.0 - left), -square * (1.0 - left), 0.0]);
+                sample.add(unweighted, |light, square| [light * (1.0 - weight), -square * (1.0 - weight), 0.0]);
             }
         }
     }

@@ -69,7 +69,7 @@ pub(super) fn trace(
             if bounce > 0 {
                 store(wave, block, bounce, photons);
             } else {
-                drop_found(&context, wave, block);
+                drop_evaluated(&context, wave, block);
             }
             materials::sort_by_bsdf(&mut wave.vertices);
             vertices::build_frames(&context, wave);
@@ -155,12 +155,12 @@ fn keep_starts(wave: &mut Wave, block: usize) {
     }
 }
 
-/// Ends the photons whose light is found without them.
-fn drop_found(context: &Context, wave: &mut Wave, block: usize) {
+/// Ends the photons whose light is evaluated along camera paths.
+fn drop_evaluated(context: &Context, wave: &mut Wave, block: usize) {
     let Wave { vertices, photons, .. } = wave;
     for lane in 0..vertices.count {
         let light = photons[block * BATCH + vertices.path(lane)].light;
-        if specular_direct::finds_photon(context, vertices.rows.flags[lane], light) {
+        if specular_direct::replaces_photon(context, vertices.rows.flags[lane], light) {
             vertices.rows.flags[lane] |= vertex_flags::MISS;
             vertices.rows.throughput.set(lane, Rgb::BLACK);
         }

@@ -43,10 +43,10 @@ pub(super) fn is_enabled(context: &Context) -> bool {
     context.emitter_prims.is_some() && (context.bounce == 0 || context.pass.light_paths.is_none())
 }
 
-/// Whether light that a photon carries from an emitter to its first vertex, with these flags, is found in this way.
-pub(super) fn finds_photon(context: &Context, flags: u32, light: LightId) -> bool {
-    let is_found = context.emitter_prims.is_some() && flags & vertex_flags::MIXED_SPECULAR != 0;
-    is_found && matches!(context.scene.lights.get(light), Light::Area(_))
+/// Whether the light of a photon that starts at a vertex with these flags is evaluated along camera paths.
+pub(super) fn replaces_photon(context: &Context, flags: u32, light: LightId) -> bool {
+    let is_evaluated = context.emitter_prims.is_some() && flags & vertex_flags::MIXED_SPECULAR != 0;
+    is_evaluated && matches!(context.scene.lights.get(light), Light::Area(_))
 }
 
 /// Queues the shadow rays of a block's vertices along specular reflections.

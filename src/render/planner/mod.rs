@@ -239,7 +239,7 @@ impl RenderState {
 
     /// The pass under way was cancelled: tiles differ in their samples.
     pub(super) fn cancel_pass(&mut self) {
-        self.torn = true;
+        self.is_uneven = true;
         if let Planner::Guided(planner) = &mut self.planner {
             // The guide has learned from only some of the samples, and their weights are unknown.
             (self.done, self.tiles_in_partial_pass) = (planner.discard_iteration(), 0);
@@ -258,7 +258,7 @@ impl RenderState {
     /// With a target error, the picture's relative squared error.
     pub(super) fn estimated_error(&self) -> Option<f64> {
         match &self.planner {
-            Planner::Adaptive(planner) if !self.torn => Some(planner.estimated_error(&self.film)),
+            Planner::Adaptive(planner) if !self.is_uneven => Some(planner.estimated_error(&self.film)),
             _ => None,
         }
     }

@@ -49,7 +49,7 @@ pub struct RenderState {
     pub tiles_in_partial_pass: usize,
     /// Whether a pass was cancelled: some tiles have samples that others lack, which no file can represent. The picture
     /// is whole.
-    pub torn: bool,
+    pub is_uneven: bool,
     /// Whether no sample is missing.
     pub complete: bool,
     /// What is traced from the lights; `None` before that is decided.
@@ -81,7 +81,7 @@ impl RenderState {
             shard,
             done: 0,
             tiles_in_partial_pass: 0,
-            torn: false,
+            is_uneven: false,
             complete: false,
             light_tracing: None,
             planner,
