@@ -213,9 +213,9 @@ impl TexturedMaterial {
     pub fn bsdf(&self, textures: &[Texture], footprint: &Footprint) -> Bsdf {
         match self {
             Self::Diffuse { albedo, roughness } => {
-                match (albedo.at(textures, footprint), roughness.at(textures, footprint)) {
-                    (albedo, 0.0) => Bsdf::Lambert(Lambert { albedo }),
-                    (albedo, roughness) => Bsdf::Eon(Eon { albedo, roughness }),
+                match (self.lambert_albedo(textures, footprint), roughness.at(textures, footprint)) {
+                    (Some(albedo), _) => Bsdf::Lambert(Lambert { albedo }),
+                    (None, roughness) => Bsdf::Eon(Eon { albedo: albedo.at(textures, footprint), roughness }),
                 }
             }
             Self::DiffuseTransmission { reflectance, transmittance } => Bsdf::DiffuseTransmission(
@@ -266,6 +266,17 @@ impl TexturedMaterial {
             Self::Hair { color, hair, azimuthal } => {
                 Bsdf::Hair(hair.with_absorption(color.absorption(*azimuthal, textures, footprint)))
             }
+        }
+    }
+
+    /// The albedo over `footprint` where the scattering is Lambert's.
+    #[inline]
+    pub fn lambert_albedo(&self, textures: &[Texture], footprint: &Footprint) -> Option<Rgb> {
+        match self {
+            Self::Diffuse { albedo, roughness } if roughness.at(textures, footprint) == 0.0 => {
+                Some(albedo.at(textures, footprint))
+            }
+            _ => None,
         }
     }
 

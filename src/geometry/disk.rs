@@ -97,10 +97,20 @@ impl Disk {
     /// A point distributed uniformly by area.
     #[inline(always)]
     pub fn sample(&self, u: [f64; 2]) -> ShapeSample {
+        if self.is_full_turn() { self.sample_turn::<true>(u) } else { self.sample_turn::<false>(u) }
+    }
+
+    /// [`sample`](Self::sample), where it is known whether all angles are kept.
+    #[inline(always)]
+    pub(super) fn sample_turn<const FULL: bool>(&self, u: [f64; 2]) -> ShapeSample {
         // rho² is uniform between the squared radii.
         let inner_squared = self.inner_radius * self.inner_radius;
         let rho = (inner_squared + (self.radius * self.radius - inner_squared) * u[1]).sqrt();
-        ShapeSample { p: (self.sector.direction(u[0]) * rho).extend(0.0), n: DVec3::Z, pdf_area: 1.0 / self.area }
+        ShapeSample {
+            p: (self.sector.direction_of::<FULL>(u[0]) * rho).extend(0.0),
+            n: DVec3::Z,
+            pdf_area: 1.0 / self.area,
+        }
     }
 }
 

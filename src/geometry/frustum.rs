@@ -179,13 +179,19 @@ impl Frustum {
     /// A point distributed uniformly by area.
     #[inline(always)]
     pub fn sample(&self, u: [f64; 2]) -> ShapeSample {
+        if self.is_full_turn() { self.sample_turn::<true>(u) } else { self.sample_turn::<false>(u) }
+    }
+
+    /// [`sample`](Self::sample), where it is known whether all angles are kept.
+    #[inline(always)]
+    pub(super) fn sample_turn<const FULL: bool>(&self, u: [f64; 2]) -> ShapeSample {
         // The density along the side is proportional to the radius; inverted without dividing by the difference of the
         // radii.
         let (bottom, top) = (self.radius, self.top_radius);
         let radius = (bottom * bottom + u[1] * (top * top - bottom * bottom)).max(0.0).sqrt();
         let sum = bottom + radius;
         let v = if sum > 0.0 { (u[1] * (bottom + top) / sum).min(1.0) } else { 0.0 };
-        let toward = self.sector.direction(u[0]);
+        let toward = self.sector.direction_of::<FULL>(u[0]);
         ShapeSample {
             p: (toward * (bottom + (top - bottom) * v)).extend(v * self.height),
             n: self.normal(toward.x, toward.y),

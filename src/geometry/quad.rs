@@ -123,6 +123,12 @@ impl Quad {
     pub fn sample(&self, u: [f64; 2]) -> ShapeSample {
         ShapeSample { p: self.point(u[0], u[1]), n: self.n, pdf_area: 1.0 / self.area }
     }
+
+    /// [`sample`](Self::sample): there are no angles.
+    #[inline(always)]
+    pub(super) fn sample_turn<const FULL: bool>(&self, u: [f64; 2]) -> ShapeSample {
+        self.sample(u)
+    }
 }
 
 #[cfg(test)]

@@ -80,7 +80,14 @@ impl Sector {
     /// Cosine and sine of the angle `fraction * phi_max`.
     #[inline(always)]
     pub(super) fn direction(&self, fraction: f64) -> DVec2 {
-        if self.is_full {
+        if self.is_full { self.direction_of::<true>(fraction) } else { self.direction_of::<false>(fraction) }
+    }
+
+    /// [`direction`](Self::direction), where it is known whether the sector is `FULL`: a branch in a loop over rows
+    /// would compute both for all of them.
+    #[inline(always)]
+    pub(super) fn direction_of<const FULL: bool>(&self, fraction: f64) -> DVec2 {
+        if FULL {
             // The choice of an angle may round.
             return unit_circle(fraction as f32);
         }

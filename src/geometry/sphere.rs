@@ -66,6 +66,11 @@ impl Sphere {
         !self.cuts_z && self.sector.is_full()
     }
 
+    /// Whether all angles are kept.
+    pub fn is_full_turn(&self) -> bool {
+        self.sector.is_full()
+    }
+
     /// The radius.
     #[inline]
     pub fn radius(&self) -> f64 {
@@ -129,9 +134,15 @@ impl Sphere {
     /// A point distributed uniformly by area (a sphere's area between two heights is proportional to their difference).
     #[inline(always)]
     pub fn sample(&self, u: [f64; 2]) -> ShapeSample {
+        if self.is_full_turn() { self.sample_turn::<true>(u) } else { self.sample_turn::<false>(u) }
+    }
+
+    /// [`sample`](Self::sample), where it is known whether all angles are kept.
+    #[inline(always)]
+    pub(super) fn sample_turn<const FULL: bool>(&self, u: [f64; 2]) -> ShapeSample {
         let z = (self.z_min + (self.z_max - self.z_min) * u[1]).clamp(self.z_min, self.z_max);
         let rho = ((self.radius - z) * (self.radius + z)).sqrt();
-        let p = (self.sector.direction(u[0]) * rho).extend(z);
+        let p = (self.sector.direction_of::<FULL>(u[0]) * rho).extend(z);
         ShapeSample { p, n: p / self.radius, pdf_area: 1.0 / self.area }
     }
 }

@@ -4,6 +4,9 @@
 //! stay in the processor's caches, a cell by the weights of its block, which are one cache line: a sample waits for
 //! memory once, however large the grid is.
 
+use pulp::cast;
+use pulp::x86::V4;
+
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::vectorize::vectorize;
 
@@ -124,6 +127,32 @@ const FANOUT: usize = 16;
 #[repr(align(64))]
 struct Keys([u32; FANOUT]);
 
+/// Counts keys.
+trait CountKeys: Copy {
+    /// How many keys are not above a limit.
+    fn count_up_to(self, keys: &Keys, limit: u32) -> u32;
+}
+
+/// On every processor.
+#[derive(Clone, Copy)]
+struct Portable;
+
+impl CountKeys for Portable {
+    #[inline(always)]
+    fn count_up_to(self, Keys(keys): &Keys, limit: u32) -> u32 {
+        keys.iter().map(|&key| u32::from(key <= limit)).sum()
+    }
+}
+
+impl CountKeys for V4 {
+    // One comparison gives a bit for each key, which the compiler does not find by itself.
+    #[inline(always)]
+    fn count_up_to(self, Keys(keys): &Keys, limit: u32) -> u32 {
+        let limits = self.avx512f._mm512_set1_epi32(limit as i32);
+        self.avx512f._mm512_cmple_epu32_mask(cast(*keys), limits).count_ones()
+    }
+}
+
 /// A block that was chosen.
 #[derive(Clone, Copy, Default)]
 struct ChosenBlock {
@@ -206,13 +235,12 @@ impl Table {
 
     /// Inverts a distribution at `u` in `[0, 1)`: the entry with `lower <= u < upper`.
     #[inline(always)]
-    fn invert(&self, which: usize, u: f32) -> Inverse {
+    fn invert(&self, by: impl CountKeys, which: usize, u: f32) -> Inverse {
         let x = f64::from(u) * f64::from(WHOLE);
         let unit = x as u32;
         let mut index = 0;
         for level in &self.levels {
-            let Keys(keys) = level.nodes[which * level.count + index];
-            let before: u32 = keys.iter().map(|&key| u32::from(key <= unit)).sum();
+            let before = by.count_up_to(&level.nodes[which * level.count + index], unit);
             index = index * FANOUT + before as usize;
         }
         let [lower, upper] = self.limits(which, index);
@@ -256,7 +284,7 @@ impl Piecewise2d {
     /// the second the row.
     #[inline]
     pub fn sample_cell(&self, u: [f32; 2]) -> PiecewiseCell {
-        let chosen = self.choose_block(u);
+        let chosen = self.choose_block(Portable, u);
         chosen.cell_in(&self.blocks[self.block_at(&chosen)])
     }
 
@@ -265,7 +293,13 @@ impl Piecewise2d {
     #[inline]
     pub fn sample_cells<const N: usize>(&self, us: &[[f32; 2]], cells: &mut [PiecewiseCell; N]) {
         let mut chosen = [ChosenBlock::default(); N];
-        vectorize!(self.choose_blocks(us, &mut chosen));
+        match V4::try_new() {
+            Some(simd) => simd.vectorize(
+                #[inline(always)]
+                || self.choose_blocks(simd, us, &mut chosen),
+            ),
+            None => vectorize!(self.choose_blocks(Portable, us, &mut chosen)),
+        }
         // Nothing but copies, which do not wait for one another.
         let mut blocks = [Block::default(); N];
         for (block, chosen) in blocks.iter_mut().zip(&chosen).take(us.len()) {
@@ -277,16 +311,16 @@ impl Piecewise2d {
     }
 
     #[inline(always)]
-    fn choose_blocks(&self, us: &[[f32; 2]], chosen: &mut [ChosenBlock]) {
+    fn choose_blocks(&self, by: impl CountKeys, us: &[[f32; 2]], chosen: &mut [ChosenBlock]) {
         for (chosen, &u) in chosen.iter_mut().zip(us) {
-            *chosen = self.choose_block(u);
+            *chosen = self.choose_block(by, u);
         }
     }
 
     #[inline(always)]
-    fn choose_block(&self, u: [f32; 2]) -> ChosenBlock {
-        let row = self.rows.invert(0, u[1]);
-        let column = self.columns.invert(row.index, u[0]);
+    fn choose_block(&self, by: impl CountKeys, u: [f32; 2]) -> ChosenBlock {
+        let row = self.rows.invert(by, 0, u[1]);
+        let column = self.columns.invert(by, row.index, u[0]);
         ChosenBlock { x: column.index, y: row.index, within: [column.within, row.within], pmf: row.pmf * column.pmf }
     }
 
@@ -361,6 +395,7 @@ impl Piecewise2d {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Rng;
 
     #[test]
     fn frequencies_equal_weights_and_densities_agree() {
@@ -413,6 +448,20 @@ mod tests {
                 let s = density.sample(u);
                 assert_eq!((s.pdf, density.pdf(s.uv)), (45.0, 45.0));
             }
+        }
+    }
+
+    #[test]
+    fn cells_of_a_batch_are_those_of_single_samples() {
+        let mut random = Rng::new(11);
+        let (width, height) = (1_300, 90);
+        let weights: Vec<f32> = (0..width * height).map(|_| random.unit_f32().powi(9)).collect();
+        let density = Piecewise2d::new(width, height, &weights).unwrap();
+        for _ in 0..50 {
+            let us: [[f32; 2]; 128] = std::array::from_fn(|_| [random.unit_f32(), random.unit_f32()]);
+            let mut cells = [PiecewiseCell::default(); 128];
+            density.sample_cells(&us, &mut cells);
+            assert_eq!(cells, us.map(|u| density.sample_cell(u)));
         }
     }
 

@@ -3,7 +3,7 @@
 use super::lanes::BoundingSphere;
 use super::primitives::{Polygon, PrimRecord};
 use super::shapes::PacketShape;
-use crate::accel::bvh::{Binary, Reference};
+use crate::accel::bvh::{Binary, MAX_LEAF, Reference};
 use crate::accel::inspect::ItemKind;
 use crate::accel::tree::Items;
 use crate::geometry::{Geometry, Shape, TrianglePoints};
@@ -48,6 +48,13 @@ pub(in crate::accel) struct Hierarchy<'g> {
 /// The most entries that wait on the stack: one a level.
 pub(super) const STACK: usize = 96;
 
+/// Up to this number of primitives there is one leaf: a packet of scattered rays enters most boxes anyway.
+const FLAT: usize = 20;
+
+/// The most primitives in a leaf.
+pub(super) const MAX_RUN: usize = 32;
+const _: () = assert!(MAX_RUN >= FLAT && MAX_RUN >= MAX_LEAF);
+
 impl<'g> Hierarchy<'g> {
     /// Over shapes of the world, for rays through the world of these bounds; `None` if there is nothing to hit.
     pub fn new(geometry: &'g Geometry, shapes: &[ShapeId], world: &Aabb) -> Option<Self> {
@@ -72,7 +79,11 @@ impl<'g> Hierarchy<'g> {
         let binary = Binary::new(references, |_| false);
         let mut primitives: Vec<_> = primitives.into_iter().map(Some).collect();
         let in_order = binary.references.iter().filter_map(|r| primitives[r.item as usize].take()).collect();
-        let nodes = nodes(&binary, &sphere);
+        let mut nodes = nodes(&binary, &sphere);
+        if binary.references.len() <= FLAT {
+            nodes.truncate(1);
+            nodes[0].content = NodeContent::Primitives { first: 0, count: binary.references.len() as u32 };
+        }
         let has_shapes = prims.iter().any(|prim| !prim.is_triangle);
         Some(Self { geometry, sphere, nodes, primitives: in_order, has_shapes, prims })
     }

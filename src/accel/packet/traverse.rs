@@ -4,12 +4,11 @@ use arrayvec::ArrayVec;
 use pulp::x86::{V3, V4};
 use pulp::{Scalar, Simd, WithSimd};
 
-use super::hierarchy::{Hierarchy, NodeContent, Primitive, STACK};
+use super::hierarchy::{Hierarchy, MAX_RUN, NodeContent, Primitive, STACK};
 use super::lanes::{LaneSet, NONE, Offer, Packet, any, load, store_f32s, store_u32s};
 use super::primitives::PrimRecord;
 use super::shapes::{IntervalHits, PacketShape};
 use crate::accel::HitRows;
-use crate::accel::bvh::MAX_LEAF;
 use crate::geometry::{Hit, PACKET_SIZE, RayPacket, Shape, TransformedShape, TrianglePoints, TriangleRay};
 use crate::id::ShapeId;
 use crate::math::compact::set_bits;
@@ -118,7 +117,7 @@ impl Hierarchy<'_> {
         packet: &mut Packet<S>,
     ) {
         // First the boxes of shapes: side by side they take less time than one after the other.
-        let mut lanes = [entering; MAX_LEAF];
+        let mut lanes = [entering; MAX_RUN];
         let mut entered = 0;
         for (i, (primitive, lanes)) in run.iter().zip(&mut lanes).enumerate() {
             if let (Primitive::Shape(shape), 2..) = (primitive, run.len()) {
@@ -128,7 +127,7 @@ impl Hierarchy<'_> {
         }
         for i in set_bits(entered) {
             if let Primitive::Shape(shape) = &run[i] {
-                self.intersect_shape::<S, ANY>(simd, shape, lanes[i % MAX_LEAF], packet);
+                self.intersect_shape::<S, ANY>(simd, shape, lanes[i % MAX_RUN], packet);
             } else {
                 self.intersect_polygon::<S, ANY, true>(simd, &run[i], packet);
             }

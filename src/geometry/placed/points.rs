@@ -46,16 +46,19 @@ soa! {
 /// Samples the first `count` points, at most [`BATCH`]. Surfaces of revolution are sampled alone.
 pub(super) fn sample(placed: &TransformedShape, u: &[Row; 2], count: usize, out: &mut WorldSampleRows) {
     vectorize!(match &placed.shape {
-        Analytic::Sphere(sphere) => sample_on(placed, sphere, u, count, out),
-        Analytic::Quad(quad) => sample_on(placed, quad, u, count, out),
-        Analytic::Disk(disk) => sample_on(placed, disk, u, count, out),
-        Analytic::Frustum(frustum) => sample_on(placed, frustum, u, count, out),
+        Analytic::Sphere(sphere) if sphere.is_full_turn() => sample_on::<_, true>(placed, sphere, u, count, out),
+        Analytic::Sphere(sphere) => sample_on::<_, false>(placed, sphere, u, count, out),
+        Analytic::Quad(quad) => sample_on::<_, true>(placed, quad, u, count, out),
+        Analytic::Disk(disk) if disk.is_full_turn() => sample_on::<_, true>(placed, disk, u, count, out),
+        Analytic::Disk(disk) => sample_on::<_, false>(placed, disk, u, count, out),
+        Analytic::Frustum(frustum) if frustum.is_full_turn() => sample_on::<_, true>(placed, frustum, u, count, out),
+        Analytic::Frustum(frustum) => sample_on::<_, false>(placed, frustum, u, count, out),
         Analytic::Revolution(_) => out.pdf_area = [0.0; BATCH],
     });
 }
 
 #[inline(always)]
-fn sample_on<S: LaneShape>(
+fn sample_on<S: LaneShape, const FULL: bool>(
     placed: &TransformedShape,
     shape: &S,
     u: &[Row; 2],
@@ -63,7 +66,7 @@ fn sample_on<S: LaneShape>(
     out: &mut WorldSampleRows,
 ) {
     for i in 0..count.next_multiple_of(16).min(BATCH) {
-        let sample = shape.sample(pair(u, i).map(f64::from));
+        let sample = shape.sample::<FULL>(pair(u, i).map(f64::from));
         let point = placed.place(sample.p, sample.n, sample.pdf_area);
         out.p.set(i, point.p);
         out.n.set(i, point.n.as_dvec3());
@@ -94,7 +97,8 @@ pub(super) fn resolve(
 trait LaneShape {
     fn distance(&self, ray: &RayF64) -> f64;
     fn place(&self, ray: &RayF64, hit: &LocalHit) -> LocalSurface;
-    fn sample(&self, u: [f64; 2]) -> ShapeSample;
+    /// `FULL`: all angles are kept.
+    fn sample<const FULL: bool>(&self, u: [f64; 2]) -> ShapeSample;
 }
 
 macro_rules! lane_shapes {
@@ -111,8 +115,8 @@ macro_rules! lane_shapes {
             }
 
             #[inline(always)]
-            fn sample(&self, u: [f64; 2]) -> ShapeSample {
-                <$shape>::sample(self, u)
+            fn sample<const FULL: bool>(&self, u: [f64; 2]) -> ShapeSample {
+                self.sample_turn::<FULL>(u)
             }
         }
     )*};

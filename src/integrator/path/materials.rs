@@ -179,6 +179,11 @@ fn evaluate_textured(context: &Context, vertices: &mut Vertices) {
         let Material::Textured(textured, _) = &scene.materials[vertices.bsdfs.ids[lane] as usize] else { continue };
         let (uv, area) = (vertices.rows.uv.get(lane), vertices.rows.texture_area[lane]);
         let footprint = scene.with_attributes(&vertices.interaction(lane), Footprint { uv, area, attributes: None });
+        // Most often; a whole BSDF would be copied.
+        if let Some(albedo) = textured.lambert_albedo(&scene.textures, &footprint) {
+            set_diffuse(vertices, lane, albedo);
+            continue;
+        }
         match textured.bsdf(&scene.textures, &footprint) {
             Bsdf::Lambert(Lambert { albedo }) => set_diffuse(vertices, lane, albedo),
             bsdf => {

@@ -1,5 +1,8 @@
 //! Sample values in batches, the same as for each sample alone.
 
+use pulp::cast;
+use pulp::x86::V4;
+
 use super::{PixelSeed, SOBOL_COLUMNS, Sampler, SamplerKind, SobolSeeds, owen_scramble, pcg_4d, unit};
 use crate::math::rows::BATCH;
 use crate::math::vectorize::vectorize;
@@ -72,7 +75,13 @@ impl Sampler {
     pub fn sample_4d_batch(&self, requests: &SampleIdRows, count: usize, set: u32, numbers: &mut SampleRows) {
         let count = count.min(BATCH);
         match self.kind {
-            SamplerKind::Sobol => vectorize!(draw::<true>(requests, count, set, numbers)),
+            SamplerKind::Sobol => match V4::try_new() {
+                Some(simd) => simd.vectorize(
+                    #[inline(always)]
+                    || draw_by_tables(simd, requests, count, set, numbers),
+                ),
+                None => vectorize!(draw::<true>(requests, count, set, numbers)),
+            },
             SamplerKind::Independent => vectorize!(draw::<false>(requests, count, set, numbers)),
         }
     }
@@ -109,6 +118,58 @@ fn sobol_4d_by_columns(pixel: PixelSeed, sample: u32, set: u32) -> [u32; 4] {
     add_columns!(point, index, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27 28 29 30 31);
     let scramble = |k: usize| reversed(owen_scramble(point[k], seeds.scrambles[k]));
     [scramble(0), scramble(1), scramble(2), scramble(3)]
+}
+
+/// The columns of four bits of the index together: the points of the second to fourth dimension for each of their
+/// values.
+const DIGITS: [[[u32; WIDTH]; 3]; 8] = {
+    let mut digits = [[[0; WIDTH]; 3]; 8];
+    let mut i = 0;
+    while i < 8 * 3 * WIDTH * 4 {
+        let (bit, value, k, digit) = (i % 4, i / 4 % WIDTH, i / (4 * WIDTH) % 3, i / (12 * WIDTH));
+        if value >> bit & 1 != 0 {
+            digits[digit][k][value] ^= SOBOL_COLUMNS[4 * digit + bit][k + 1];
+        }
+        i += 1;
+    }
+    digits
+};
+
+/// Numbers in a vector of AVX-512, and the values of four bits.
+const WIDTH: usize = 16;
+
+/// [`draw`] for Sobol points, with a lookup in registers for each four bits of the index: three times as fast there as
+/// adding columns.
+#[inline(always)]
+fn draw_by_tables(simd: V4, requests: &SampleIdRows, count: usize, set: u32, numbers: &mut SampleRows) {
+    for first in (0..count.min(BATCH)).step_by(WIDTH) {
+        let (mut points, mut scrambles) = ([[0; WIDTH]; 4], [[0; WIDTH]; 4]);
+        for i in 0..WIDTH {
+            let seeds = SobolSeeds::new(requests.pixels[first + i], set);
+            points[0][i] = owen_scramble(reversed(requests.samples[first + i]), seeds.shuffle);
+            for k in 0..4 {
+                scrambles[k][i] = seeds.scrambles[k];
+            }
+        }
+        let mut digits = points[0];
+        for tables in &DIGITS {
+            for k in 0..3 {
+                let found: [u32; WIDTH] = cast(simd.avx512f._mm512_permutexvar_epi32(cast(digits), cast(tables[k])));
+                for i in 0..WIDTH {
+                    points[k + 1][i] ^= found[i];
+                }
+            }
+            for digit in &mut digits {
+                *digit >>= 4;
+            }
+        }
+        for k in 0..4 {
+            for i in 0..WIDTH {
+                let point = if k == 0 { reversed(points[k][i]) } else { points[k][i] };
+                numbers.0[k][first + i] = unit(reversed(owen_scramble(point, scrambles[k][i])));
+            }
+        }
+    }
 }
 
 /// `reverse_bits` in steps that every vector unit has.
