@@ -147,8 +147,8 @@ fn draw_by_tables(simd: V4, requests: &SampleIdRows, count: usize, set: u32, num
         for i in 0..WIDTH {
             let seeds = SobolSeeds::new(requests.pixels[first + i], set);
             points[0][i] = owen_scramble(reversed(requests.samples[first + i]), seeds.shuffle);
-            for k in 0..4 {
-                scrambles[k][i] = seeds.scrambles[k];
+            for (row, scramble) in scrambles.iter_mut().zip(seeds.scrambles) {
+                row[i] = scramble;
             }
         }
         let mut digits = points[0];
