@@ -197,9 +197,14 @@ fn furnace() -> Value {
 
 #[test]
 fn a_pilot_decides_where_photons_are_worth_their_time() {
-    for (scene, is_worth_it) in [(small_lamp(), true), (balls(), false), (furnace(), false)] {
+    let mut clamped = small_lamp();
+    clamped["integrator"]["clamp"] = json!(10);
+    let (auto, off) = (AutoDesc::Auto, AutoDesc::Off);
+    for (scene, bidirectional, is_worth_it) in
+        [(small_lamp(), auto, true), (balls(), off, true), (furnace(), off, false), (clamped, off, false)]
+    {
         let of_choice = |caustics, spp| {
-            let bidirectional = Some(if is_worth_it { AutoDesc::Auto } else { AutoDesc::Off });
+            let bidirectional = Some(bidirectional);
             of(&scene, caustics, &Overrides { bidirectional, spp: Some(spp), ..Overrides::default() })
         };
         let [auto, photons, paths] =

@@ -147,10 +147,12 @@ impl Settings {
 
     /// What is traced from the lights: `None` if a pilot decides.
     pub fn light_tracing(&self) -> Option<LightTracing> {
-        let IntegratorDesc::Path { caustics, bidirectional, max_depth, .. } = self.integrator else {
+        let IntegratorDesc::Path { caustics, bidirectional, max_depth, clamp, .. } = self.integrator else {
             return Some(LightTracing::Off);
         };
-        let has_pilot = self.planned_spp() >= LEAST_LIGHT_TRACING_SPP && max_depth >= LEAST_LIGHT_TRACING_DEPTH;
+        // Clamping takes other light from paths than from photons: what a pilot decides would change the picture.
+        let has_pilot =
+            self.planned_spp() >= LEAST_LIGHT_TRACING_SPP && max_depth >= LEAST_LIGHT_TRACING_DEPTH && clamp.is_none();
         self.light_tracing.or(match (caustics, bidirectional) {
             (CausticsDesc::Photons, _) => Some(LightTracing::Photons),
             (_, AutoDesc::On) => Some(LightTracing::Bidirectional),
