@@ -21,8 +21,8 @@ const LEAST_DIFFERENCE: f64 = 0.05;
 /// The time of a ray of a path with connections or photons over that of another, connections or gathering included.
 const RAY_COST: f64 = 1.25;
 
-/// How a gain is estimated.
-struct Caution {
+/// How a lower bound of a gain is estimated.
+struct GainBound {
     /// The part of the pixels, those where a method gains most, that is left out: what rare bright samples seem to gain
     /// is less certain than the deviation shows.
     left_out: f64,
@@ -30,15 +30,11 @@ struct Caution {
     deviations: f64,
 }
 
-/// Whether a method is worth its time: caustics often cover one pixel of a hundred.
-const WHETHER: Caution = Caution { left_out: 0.002, deviations: 1.0 };
+/// For whether a method is worth its time: caustics often cover one pixel of a hundred.
+const WORTHWHILE: GainBound = GainBound { left_out: 0.002, deviations: 1.0 };
 
-/// Which of two methods that are is better.
-const WHICH: Caution = Caution { left_out: 0.02, deviations: 2.0 };
-
-/// Inverse variance for the time over that of unidirectional paths, at least, of a method that is worth its time.
-#[derive(Clone, Copy, PartialEq, PartialOrd)]
-struct Efficiency(f64);
+/// For which of two methods that are is better.
+const COMPARISON: GainBound = GainBound { left_out: 0.02, deviations: 2.0 };
 
 /// A pilot being traced, with samples without any method.
 struct Pilot<'a, 'b> {
@@ -77,27 +73,27 @@ pub(super) fn choose(renderer: &mut TileRenderer, workspaces: &[Mutex<TileWorksp
 }
 
 impl Pilot<'_, '_> {
-    /// Of what the renderer has; `None` where it is not worth its time. Of rays from lights, the picture has
-    /// `light_ray_factor` times as many.
-    fn efficiency(&mut self, light_ray_factor: f64) -> Option<Efficiency> {
+    /// Inverse variance for the time over that of unidirectional paths, at least, with what the renderer has; `None`
+    /// where that is not worth its time. Of rays from lights, the picture has `light_ray_factor` times as many.
+    fn efficiency(&mut self, light_ray_factor: f64) -> Option<f64> {
         let light_rays = self.renderer.trace_from_lights(FIRST_SAMPLE, self.workspaces).total() as f64;
         let samples = trace(self.renderer, SAMPLES, self.workspaces);
         // They are shared by all samples of an epoch.
         let shared_by = f64::from(EPOCH) * self.renderer.whole_view().area() as f64;
         let light_rays = light_rays * light_ray_factor / shared_by;
         let cost = RAY_COST * (samples.rays() + light_rays) / self.unidirectional.rays();
-        tracing::info!("pilot of light tracing: {:?} for {cost:.2} of the time", samples.gain(WHETHER.left_out));
+        tracing::info!("pilot of light tracing: {:?} for {cost:.2} of the time", samples.gain(WORTHWHILE.left_out));
         // Where paths find all light and have hardly any noise, what they add from vertex to vertex cancels out.
         let have_noise = self.unidirectional.relative_variance() > LEAST_NOISE;
         let miss_light = (self.unidirectional.mean() / samples.mean() - 1.0).abs() > LEAST_DIFFERENCE;
         if !have_noise && !miss_light {
             return None;
         }
-        let at_least = |Caution { left_out, deviations }: Caution| {
+        let at_least = |GainBound { left_out, deviations }: GainBound| {
             samples.gain(left_out).map(|gain| (gain.value - deviations * gain.deviation) / cost)
         };
-        at_least(WHETHER).filter(|&efficiency| efficiency > 1.0)?;
-        at_least(WHICH).map(Efficiency)
+        at_least(WORTHWHILE).filter(|&efficiency| efficiency > 1.0)?;
+        at_least(COMPARISON)
     }
 }
 

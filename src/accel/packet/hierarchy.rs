@@ -48,12 +48,12 @@ pub(in crate::accel) struct Hierarchy<'g> {
 /// The most entries that wait on the stack: one a level.
 pub(super) const STACK: usize = 96;
 
-/// Up to this number of primitives there is one leaf: a packet of scattered rays enters most boxes anyway.
-const FLAT: usize = 20;
+/// Up to this number of primitives there is one leaf: a packet of incoherent rays enters most boxes anyway.
+const SINGLE_LEAF: usize = 20;
 
 /// The most primitives in a leaf.
-pub(super) const MAX_RUN: usize = 32;
-const _: () = assert!(MAX_RUN >= FLAT && MAX_RUN >= MAX_LEAF);
+pub(super) const MAX_PACKET_LEAF: usize = 32;
+const _: () = assert!(MAX_PACKET_LEAF >= SINGLE_LEAF && MAX_PACKET_LEAF >= MAX_LEAF);
 
 impl<'g> Hierarchy<'g> {
     /// Over shapes of the world, for rays through the world of these bounds; `None` if there is nothing to hit.
@@ -80,7 +80,7 @@ impl<'g> Hierarchy<'g> {
         let mut primitives: Vec<_> = primitives.into_iter().map(Some).collect();
         let in_order = binary.references.iter().filter_map(|r| primitives[r.item as usize].take()).collect();
         let mut nodes = nodes(&binary, &sphere);
-        if binary.references.len() <= FLAT {
+        if binary.references.len() <= SINGLE_LEAF {
             nodes.truncate(1);
             nodes[0].content = NodeContent::Primitives { first: 0, count: binary.references.len() as u32 };
         }

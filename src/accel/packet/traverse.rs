@@ -4,7 +4,7 @@ use arrayvec::ArrayVec;
 use pulp::x86::{V3, V4};
 use pulp::{Scalar, Simd, WithSimd};
 
-use super::hierarchy::{Hierarchy, MAX_RUN, NodeContent, Primitive, STACK};
+use super::hierarchy::{Hierarchy, MAX_PACKET_LEAF, NodeContent, Primitive, STACK};
 use super::lanes::{LaneSet, NONE, Offer, Packet, any, load, store_f32s, store_u32s};
 use super::primitives::PrimRecord;
 use super::shapes::{IntervalHits, PacketShape};
@@ -117,7 +117,7 @@ impl Hierarchy<'_> {
         packet: &mut Packet<S>,
     ) {
         // First the boxes of shapes: side by side they take less time than one after the other.
-        let mut lanes = [entering; MAX_RUN];
+        let mut lanes = [entering; MAX_PACKET_LEAF];
         let mut entered = 0;
         for (i, (primitive, lanes)) in run.iter().zip(&mut lanes).enumerate() {
             if let (Primitive::Shape(shape), 2..) = (primitive, run.len()) {
@@ -127,7 +127,7 @@ impl Hierarchy<'_> {
         }
         for i in set_bits(entered) {
             if let Primitive::Shape(shape) = &run[i] {
-                self.intersect_shape::<S, ANY>(simd, shape, lanes[i % MAX_RUN], packet);
+                self.intersect_shape::<S, ANY>(simd, shape, lanes[i % MAX_PACKET_LEAF], packet);
             } else {
                 self.intersect_polygon::<S, ANY, true>(simd, &run[i], packet);
             }

@@ -179,25 +179,18 @@ fn evaluate_textured(context: &Context, vertices: &mut Vertices) {
         let Material::Textured(textured, _) = &scene.materials[vertices.bsdfs.ids[lane] as usize] else { continue };
         let (uv, area) = (vertices.rows.uv.get(lane), vertices.rows.texture_area[lane]);
         let footprint = scene.with_attributes(&vertices.interaction(lane), Footprint { uv, area, attributes: None });
-        // Most often; a whole BSDF would be copied.
+        // Without a BSDF, which would be copied.
         if let Some(albedo) = textured.lambert_albedo(&scene.textures, &footprint) {
             set_diffuse(vertices, lane, albedo);
             continue;
         }
-        match textured.bsdf(&scene.textures, &footprint) {
-            Bsdf::Lambert(Lambert { albedo }) => set_diffuse(vertices, lane, albedo),
-            bsdf => {
-                set_non_diffuse(&mut vertices.rows, &mut vertices.non_diffuse, lane, &bsdf);
-                let group = if textured.can_be_grouped() && bsdf.can_vary() {
-                    Some(VARYING | vertices.bsdfs.ids[lane])
-                } else {
-                    None
-                };
-                vertices.bsdfs.set_made(lane, bsdf);
-                if let Some(group) = group {
-                    vertices.bsdfs.groups[lane] = group;
-                }
-            }
+        let bsdf = textured.bsdf(&scene.textures, &footprint);
+        set_non_diffuse(&mut vertices.rows, &mut vertices.non_diffuse, lane, &bsdf);
+        let group =
+            if textured.can_be_grouped() && bsdf.can_vary() { Some(VARYING | vertices.bsdfs.ids[lane]) } else { None };
+        vertices.bsdfs.set_made(lane, bsdf);
+        if let Some(group) = group {
+            vertices.bsdfs.groups[lane] = group;
         }
     }
 }

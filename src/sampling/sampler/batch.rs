@@ -120,8 +120,7 @@ fn sobol_4d_by_columns(pixel: PixelSeed, sample: u32, set: u32) -> [u32; 4] {
     [scramble(0), scramble(1), scramble(2), scramble(3)]
 }
 
-/// The columns of four bits of the index together: the points of the second to fourth dimension for each of their
-/// values.
+/// By four bits of the index, dimension (from the second on) and value of these bits, the sum of their columns.
 const DIGITS: [[[u32; WIDTH]; 3]; 8] = {
     let mut digits = [[[0; WIDTH]; 3]; 8];
     let mut i = 0;
@@ -138,8 +137,7 @@ const DIGITS: [[[u32; WIDTH]; 3]; 8] = {
 /// Numbers in a vector of AVX-512, and the values of four bits.
 const WIDTH: usize = 16;
 
-/// [`draw`] for Sobol points, with a lookup in registers for each four bits of the index: three times as fast there as
-/// adding columns.
+/// [`draw`] for Sobol points, with a lookup in registers for each four bits of the index.
 #[inline(always)]
 fn draw_by_tables(simd: V4, requests: &SampleIdRows, count: usize, set: u32, numbers: &mut SampleRows) {
     for first in (0..count.min(BATCH)).step_by(WIDTH) {
