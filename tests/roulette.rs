@@ -58,6 +58,7 @@ fn the_mean_is_that_without_roulette() {
     let off = blocks(RouletteDesc::Off, 0);
     assert_blocks_agree(&blocks(RouletteDesc::Auto, 100), &off, "auto");
     assert_blocks_agree(&blocks(RouletteDesc::Throughput, 200), &off, "throughput");
+    assert_blocks_agree(&blocks(RouletteDesc::ShadowRays, 300), &off, "shadow rays");
 }
 
 /// Two renders differ by twice the variance of one.
@@ -88,15 +89,21 @@ fn shadow_rays_that_carry_little_are_traced_less_often() {
         let render = |seed| render_with(&prepare(&scene, &overrides(roulette, seed, 32)), AccelKind::EMBREE);
         (first..first + 8).map(render).collect()
     };
-    let (off, auto) = (renders(RouletteDesc::Throughput, 0), renders(RouletteDesc::Auto, 100));
-    let share = |rendered: &[RenderResult]| {
-        let sum = |of: fn(&RayCounts) -> u64| rendered.iter().map(|rendered| of(&rendered.stats.rays)).sum::<u64>();
-        sum(|rays| rays.shadow) as f64 / sum(|rays| rays.camera + rays.indirect) as f64
+    let sum = |renders: &[RenderResult], of: fn(&RayCounts) -> u64| {
+        renders.iter().map(|r| of(&r.stats.rays)).sum::<u64>() as f64
     };
-    assert!(share(&auto) < 0.8 * share(&off), "{} {}", share(&auto), share(&off));
+    let paths = |renders: &[RenderResult]| sum(renders, |rays| rays.camera + rays.indirect);
+    let share = |renders: &[RenderResult]| sum(renders, |rays| rays.shadow) / paths(renders);
     let blocks =
         |rendered: &[RenderResult]| rendered.iter().map(|rendered| block_means(&rendered.image)).collect::<Vec<_>>();
-    assert_blocks_agree(&blocks(&auto), &blocks(&off), "shadow rays");
+    let (off, throughput) = (renders(RouletteDesc::Off, 0), renders(RouletteDesc::Throughput, 50));
+    let (auto, shadow_rays) = (renders(RouletteDesc::Auto, 100), renders(RouletteDesc::ShadowRays, 150));
+    for (without, with, name) in [(&throughput, &auto, "auto"), (&off, &shadow_rays, "shadow rays")] {
+        assert!(share(with) < 0.8 * share(without), "{name}: {} {}", share(with), share(without));
+        assert_blocks_agree(&blocks(with), &blocks(without), name);
+    }
+    // Paths are as long as without roulette.
+    assert!((paths(&shadow_rays) / paths(&off) - 1.0).abs() < 0.01, "{} {}", paths(&shadow_rays), paths(&off));
 }
 
 #[test]
@@ -107,7 +114,9 @@ fn the_bits_do_not_depend_on_threads_or_parts() {
     };
     assert!(of_threads(1) == of_threads(3));
     assert!(of_threads(1) != image(&room(), &overrides(RouletteDesc::Off, 1, 8)));
-    assert_resumed_split_and_replayed(&room(), &overrides(RouletteDesc::Auto, 1, 21));
+    for roulette in [RouletteDesc::Auto, RouletteDesc::ShadowRays] {
+        assert_resumed_split_and_replayed(&room(), &overrides(roulette, 1, 21));
+    }
 }
 
 /// There is nothing to estimate; and no shape is the bound of a grid.
@@ -137,7 +146,18 @@ fn the_option_replaces_what_the_scene_says() {
         (integrator.roulette().unwrap(), rr_depth)
     };
     let (auto, throughput, off) = (RouletteDesc::Auto, RouletteDesc::Throughput, RouletteDesc::Off);
-    assert_eq!(of(&room(), None), (throughput, Some(64)));
+    let shadow_rays = RouletteDesc::ShadowRays;
+    assert_eq!(of(&room(), None), (shadow_rays, Some(64)));
+    for (max_depth, rr_depth, expected) in
+        [(24, 23, shadow_rays), (24, 22, throughput), (7, u32::MAX, shadow_rays), (6, 64, throughput)]
+    {
+        let mut room = room();
+        room["integrator"] = json!({ "type": "path", "max_depth": max_depth, "rr_depth": rr_depth });
+        assert_eq!(of(&room, None).0, expected, "{max_depth} {rr_depth}");
+        room["integrator"]["roulette"] = json!("throughput");
+        assert_eq!(of(&room, None).0, throughput);
+    }
+    assert_eq!(of(&room(), Some(shadow_rays)), (shadow_rays, Some(64)));
     assert_eq!(of(&room(), Some(throughput)), (throughput, Some(5)));
     assert_eq!(of(&room(), Some(auto)).0, auto);
     assert_eq!(of(&room(), Some(off)).0, off);

@@ -218,11 +218,12 @@ pub enum IntegratorDesc {
         /// Segments before Russian roulette by throughput may end a path. Default: 5.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         rr_depth: Option<u32>,
-        /// When Russian roulette may end a path. Default: auto, or throughput where `rr_depth` is given.
+        /// What Russian roulette decides about. Default: auto; where `rr_depth` is given throughput, or shadow_rays if
+        /// it keeps paths of more than six segments from being ended before the last.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         roulette: Option<RouletteDesc>,
         /// How many lights are sampled at the first surface or point in a medium that a path meets, from 1 to 64.
-        /// Default: with roulette auto, 1 to 4, as its pilot finds the least error for the time; else 1.
+        /// Default: with roulette auto or shadow_rays, 1 to 4, as its pilot finds the least error for the time; else 1.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         light_samples: Option<u32>,
         /// How directions towards lights are found.
@@ -326,10 +327,16 @@ impl IntegratorDesc {
         }
     }
 
-    /// When Russian roulette may end a path; `None` where there are no paths.
+    /// What Russian roulette decides about; `None` where there are no paths.
     pub fn roulette(&self) -> Option<RouletteDesc> {
-        let Self::Path { roulette, rr_depth, .. } = *self else { return None };
-        let default = if rr_depth.is_some() { RouletteDesc::Throughput } else { RouletteDesc::Auto };
+        let Self::Path { max_depth, roulette, rr_depth, .. } = *self else { return None };
+        let default = match rr_depth {
+            None => RouletteDesc::Auto,
+            Some(from) if from.saturating_add(1) >= max_depth && max_depth > DEFAULT_RR_DEPTH + 1 => {
+                RouletteDesc::ShadowRays
+            }
+            Some(_) => RouletteDesc::Throughput,
+        };
         Some(roulette.unwrap_or(default))
     }
 }
@@ -390,7 +397,7 @@ pub enum CausticsDesc {
     Photons,
 }
 
-/// When Russian roulette may end a path. All give the same picture; they differ in noise and time.
+/// What Russian roulette decides about. All give the same picture; they differ in noise and time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RouletteDesc {
@@ -399,7 +406,9 @@ pub enum RouletteDesc {
     /// From the second scattering on, by what a path may add to its pixel and by what it costs, as a pilot of an eighth
     /// of a sample of each pixel finds both; shadow rays by what they carry. `rr_depth` is ignored.
     Auto,
-    /// Never.
+    /// Shadow rays by what they carry, as with auto; paths are never ended. `rr_depth` is ignored.
+    ShadowRays,
+    /// Nothing.
     Off,
 }
 

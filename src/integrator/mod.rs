@@ -357,6 +357,7 @@ pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
                 max_depth,
                 roulette: match desc.roulette() {
                     Some(RouletteDesc::Auto) => Roulette::Auto,
+                    Some(RouletteDesc::ShadowRays) => Roulette::ShadowRays,
                     Some(RouletteDesc::Throughput) => {
                         Roulette::Throughput { from: rr_depth.unwrap_or(DEFAULT_RR_DEPTH) }
                     }

@@ -7,10 +7,10 @@ use crate::math::rows::{BATCH, DVec3Rows, Row, Vec3Rows};
 use crate::math::vectorize::vectorize;
 use crate::math::{Aabb, Vec3};
 
-/// When Russian roulette may end a path.
+/// What Russian roulette decides about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Roulette {
-    /// Never.
+    /// Nothing.
     Off,
     /// From this many segments on, by the throughput.
     Throughput {
@@ -19,6 +19,8 @@ pub enum Roulette {
     },
     /// From the second scattering on, by [`ContinuationGrid`]; where nothing is known, as `Throughput` from 5.
     Auto,
+    /// Shadow rays alone, by [`ContinuationGrid`].
+    ShadowRays,
 }
 
 /// With estimates, a path goes on with at least this part of what scattering has left of it: wrong estimates cannot
@@ -27,7 +29,7 @@ const LEAST_SHARE: f32 = 0.75;
 
 /// Shadow rays are traced with this many times the probability that a path worth as much would go on with: direct light
 /// is stratified better than the variance of a sample suggests, and roulette disturbs that.
-const SHADOW_SCALE: f32 = 3.0;
+const SHADOW_SCALE: f32 = 4.0;
 
 /// With which probability paths go on.
 #[derive(Clone, Copy, Debug)]
@@ -53,7 +55,7 @@ impl Roulette {
     /// The rule after `bounce` scatterings.
     pub(super) fn rule(self, bounce: u32, has_estimates: bool) -> SurvivalRule {
         let from = match self {
-            Self::Off => u32::MAX,
+            Self::Off | Self::ShadowRays => u32::MAX,
             Self::Throughput { from } => from,
             // At the first, roulette disturbs the stratification of a pixel's samples by more than it saves.
             Self::Auto if has_estimates && bounce > 0 => return SurvivalRule { least: 0.0, least_share: LEAST_SHARE },
@@ -319,7 +321,9 @@ mod tests {
     #[test]
     fn roulette_begins_where_it_is_to() {
         let dim = |roulette: Roulette, bounce, known| roulette.rule(bounce, known).probability(0.01, 0.2);
-        assert_eq!([0, 100].map(|bounce| dim(Roulette::Off, bounce, true)), [1.0, 1.0]);
+        for never in [Roulette::Off, Roulette::ShadowRays] {
+            assert_eq!([0, 100].map(|bounce| dim(never, bounce, true)), [1.0, 1.0]);
+        }
         assert_eq!([1, 2].map(|bounce| dim(Roulette::Throughput { from: 3 }, bounce, false)), [1.0, 0.01]);
         assert_eq!([3, 4].map(|bounce| dim(Roulette::Auto, bounce, false)), [1.0, 0.01]);
         assert_eq!(dim(Roulette::Auto, 0, true), 1.0);

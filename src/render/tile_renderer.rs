@@ -140,7 +140,7 @@ impl<'a> TileRenderer<'a> {
                 IntegratorDesc::Path { light_samples, .. } => light_samples,
                 _ => None,
             },
-            needs_pilot: settings.integrator.roulette() == Some(RouletteDesc::Auto),
+            needs_pilot: matches!(settings.integrator.roulette(), Some(RouletteDesc::Auto | RouletteDesc::ShadowRays)),
             light_tracing: settings.light_tracing(),
         }
     }

@@ -9,7 +9,7 @@ use super::terminator;
 use super::wave::{BsdfScratch, Wave, path_flags};
 use crate::bsdf::Lambert;
 use crate::geometry::SpawnPoint;
-use crate::integrator::roulette::SurvivalRule;
+use crate::integrator::roulette::{Roulette, SurvivalRule};
 use crate::integrator::vertex::HemisphereTest;
 use crate::math::Frame;
 use crate::math::rows::BATCH;
@@ -30,7 +30,8 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
         guided.mix(context, regions, vertices, bsdf_rows);
     }
     let Vertices { rows, points, scatter, u_bsdf, .. } = &mut *vertices;
-    let continuations = context.pass.continuations;
+    let ends_paths = context.config.roulette != Roulette::ShadowRays;
+    let continuations = context.pass.continuations.filter(|_| ends_paths);
     match continuations {
         Some(grid) => grid.find(&points.p, &rows.n, &rows.wo.0[2], &mut scatter.continuation, count),
         None => scatter.continuation = [1.0; BATCH],

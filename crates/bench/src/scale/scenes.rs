@@ -13,9 +13,6 @@ use steradian::{Error, Result};
 /// The name of the mesh that a scene is about.
 const MESH: &str = "generated.ply";
 
-/// The depth of Russian roulette: none, so that paths have the requested depth.
-const NO_ROULETTE: u32 = u32::MAX;
-
 /// The scene of a case, as if it had been read from a file.
 ///
 /// # Errors
@@ -29,7 +26,7 @@ pub(super) fn make(case: &Case) -> Result<Imported> {
     };
     scene["film"] = json!({ "width": case.size[0], "height": case.size[1], "filter": { "type": "box" } });
     scene["sampler"] = json!({ "type": "sobol", "spp": case.spp });
-    scene["integrator"] = json!({ "type": "path", "max_depth": case.depth, "rr_depth": NO_ROULETTE });
+    scene["integrator"] = json!({ "type": "path", "max_depth": case.depth, "roulette": "off" });
     let mut desc: SceneDesc = serde_json::from_value(scene).map_err(|e| Error::Internal(e.to_string()))?;
     if let Subject::Instances { count, .. } = case.subject {
         let object: Value = json!({ "shapes": [mesh_shape(1.0)] });

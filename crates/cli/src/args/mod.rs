@@ -262,12 +262,12 @@ pub struct RenderArgs {
     /// Light sampling: by lights, by materials, or both weighted by multiple importance sampling
     #[arg(long, value_name = "NAME", value_parser = names::plain::<StrategyDesc>(), help_heading = "Algorithm")]
     pub strategy: Option<StrategyDesc>,
-    /// Russian roulette: auto, throughput or off
+    /// Russian roulette: auto, throughput, shadow_rays or off
     ///
-    /// auto: by the expected contribution of a path to its pixel and the expected cost, both estimated from a pilot of
-    /// 1/8 sample per pixel; throughput: by path throughput, from depth 5 or the scene's rr_depth if that is smaller;
-    /// off: no roulette. All are unbiased. Default: the scene's setting; without one, throughput if the scene
-    /// has rr_depth, otherwise auto
+    /// auto: paths and shadow rays by expected contribution to the pixel and cost, both estimated from a pilot of 1/8
+    /// sample per pixel; shadow_rays: only these; throughput: paths by throughput, from depth 5 or a smaller rr_depth
+    /// of the scene; off: none. All are unbiased. Default: the scene's setting; without one, auto; if the scene has
+    /// rr_depth, throughput, or shadow_rays if rr_depth reaches a max_depth above 6
     #[arg(long, value_name = "NAME", value_parser = names::plain::<RouletteDesc>(), help_heading = "Algorithm")]
     pub roulette: Option<RouletteDesc>,
     /// Clamp the contribution of a single path of indirect light: less noise, but biased (too dark). Off by default;

@@ -9,6 +9,9 @@ use crate::error::Result;
 /// The depth for paths of any length.
 const UNLIMITED: u32 = 65_536;
 
+/// What files mean that do not give it: a file that gives it asks for nothing else.
+const DEFAULT_RR_DEPTH: u32 = 5;
+
 /// What a scene without an integrator is rendered with.
 pub(super) fn unlimited_path() -> IntegratorDesc {
     IntegratorDesc::path(UNLIMITED, None)
@@ -93,6 +96,6 @@ fn path(element: &mut Element) -> Result<IntegratorDesc> {
     if max_depth == 0 {
         element.approximated("max_depth", "1 in place of 0: what emits light is seen");
     }
-    let rr_depth = element.count("rr_depth", 1)?;
+    let rr_depth = element.count("rr_depth", 1)?.filter(|&depth| depth != DEFAULT_RR_DEPTH);
     Ok(IntegratorDesc::path(max_depth.max(1), rr_depth))
 }

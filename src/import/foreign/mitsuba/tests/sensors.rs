@@ -140,6 +140,7 @@ fn samplers_and_integrators() {
     let inner = r#"<integrator type="moment"><integrator type="path"><integer name="max_depth" value="7"/>
         <integer name="rr_depth" value="9"/></integrator></integrator>"#;
     assert_eq!(integrator(inner), (7, Some(9)));
+    assert_eq!(integrator(&inner.replace('9', "5")), (7, None));
     assert_eq!(integrator(r#"<integrator type="direct"/>"#).0, 2);
     let hidden = r#"<integrator type="KIND"><boolean name="hide_emitters" value="true"/></integrator>"#;
     assert!(notes(&hidden.replace("KIND", "path")).is_empty());
