@@ -6,7 +6,10 @@ use std::sync::Mutex;
 use super::epoch::trace_parts;
 use super::tile_renderer::TileWorkspace;
 use super::{LightTracing, Settings};
-use crate::integrator::{EPOCH, Emitters, Integrator, LightPaths, LightVertex, PassContext, PhotonRange, RayCounts};
+use crate::integrator::{
+    ClusteredVertices, ConnectionTables, EPOCH, Emitters, Integrator, LightPaths, LightVertex, PassContext,
+    PhotonRange, RayCounts,
+};
 use crate::sampling::{PixelSeed, Sampler};
 use crate::scene::Scene;
 
@@ -16,6 +19,12 @@ const PATHS_PER_PIXEL: f64 = 0.5;
 /// The fewest and the most light paths traced in an epoch; the most take 200 MB.
 const PATHS: RangeInclusive<f64> = 16_384.0..=250_000.0;
 
+/// Shadow rays by which it is found how their vertices are to be chosen, by pixel of the picture.
+const TABLE_RAYS_PER_PIXEL: f64 = 8.0;
+
+/// The index of the light paths of that pilot, beyond all epochs.
+const TABLE_EPOCH: u32 = u32::MAX;
+
 /// Traces light paths and keeps those of one epoch.
 pub(super) struct LightPathPass {
     emitters: Emitters,
@@ -23,8 +32,12 @@ pub(super) struct LightPathPass {
     is_pilot: bool,
     /// Light paths of an epoch.
     traced: u32,
+    /// Shadow rays for the tables.
+    table_rays: u64,
+    /// How vertices are chosen, once it has been found.
+    tables: Option<ConnectionTables>,
     /// The epoch, and the vertices of its paths.
-    vertices: Option<(u32, Vec<LightVertex>)>,
+    vertices: Option<(u32, Vec<LightVertex>, ClusteredVertices)>,
 }
 
 impl LightPathPass {
@@ -48,13 +61,19 @@ impl LightPathPass {
         let emitters = Emitters::new(scene)?;
         let [width, height] = settings.size.map(f64::from);
         let traced = (PATHS_PER_PIXEL * width * height).clamp(*PATHS.start(), *PATHS.end()) as u32;
-        Some(Self { emitters, is_pilot: false, traced, vertices: None })
+        let table_rays = (TABLE_RAYS_PER_PIXEL * width * height) as u64;
+        Some(Self { emitters, is_pilot: false, traced, table_rays, tables: None, vertices: None })
+    }
+
+    /// The tables are those that the pilot has found.
+    pub fn take_tables(&mut self, pilot: Self) {
+        self.tables = pilot.tables;
     }
 
     /// As many light paths as a pilot needs.
     pub fn for_pilot(&self) -> Self {
         let (emitters, traced) = (self.emitters.clone(), self.pilot_paths());
-        Self { emitters, is_pilot: true, traced, vertices: None }
+        Self { emitters, is_pilot: true, traced, table_rays: self.table_rays, tables: None, vertices: None }
     }
 
     /// Light paths of an epoch over those of the pilot.
@@ -68,8 +87,10 @@ impl LightPathPass {
 
     /// What paths are connected to, if there is anything.
     pub fn light_paths(&self) -> Option<LightPaths<'_>> {
-        let (_, vertices) = self.vertices.as_ref().filter(|(_, vertices)| !vertices.is_empty())?;
-        Some(LightPaths { emitters: &self.emitters, vertices, traced: self.traced, has_moments: self.is_pilot })
+        let (_, vertices, clustered) = self.vertices.as_ref().filter(|(_, vertices, _)| !vertices.is_empty())?;
+        let tables = self.tables.as_ref()?;
+        let (emitters, traced) = (&self.emitters, self.traced);
+        Some(LightPaths { emitters, vertices, tables, clustered, traced, has_moments: self.is_pilot })
     }
 
     /// Traces the light paths of a sample's epoch, unless they are there; the result is the rays traced.
@@ -82,15 +103,24 @@ impl LightPathPass {
         workspaces: &[Mutex<TileWorkspace>],
     ) -> RayCounts {
         let epoch = sample / EPOCH;
-        if self.vertices.as_ref().is_some_and(|(known, _)| *known == epoch) {
+        if self.vertices.as_ref().is_some_and(|(known, ..)| *known == epoch) {
             return RayCounts::default();
         }
         // Beyond all pixels, and beside the photons' seeds.
-        let seed: PixelSeed = sampler.pixel(epoch, u32::MAX - 1);
-        let (vertices, counts) = trace_parts(self.traced, workspaces, |indices, workspace, vertices| {
-            integrator.trace_light_paths(pass, &self.emitters, &PhotonRange { seed, indices }, workspace, vertices);
+        let pilot_paths = self.pilot_paths();
+        let trace = |epoch: u32, count: u32| {
+            let seed: PixelSeed = sampler.pixel(epoch, u32::MAX - 1);
+            trace_parts(count, workspaces, |indices, workspace, vertices| {
+                integrator.trace_light_paths(pass, &self.emitters, &PhotonRange { seed, indices }, workspace, vertices);
+            })
+        };
+        let tables = self.tables.get_or_insert_with(|| {
+            let (pilot, _) = trace(TABLE_EPOCH, pilot_paths);
+            ConnectionTables::new(&pilot, pass.world.accel, self.table_rays)
         });
-        self.vertices = Some((epoch, vertices));
+        let (vertices, counts) = trace(epoch, self.traced);
+        let clustered = tables.clustered(&vertices);
+        self.vertices = Some((epoch, vertices, clustered));
         counts
     }
 }

@@ -1,18 +1,20 @@
 //! Bidirectional path tracing: paths from the lights, whose vertices paths from the camera connect to.
 //!
-//! The vertices of many light paths are stored; every vertex of a camera path is connected to one of them, chosen at
-//! random ("light vertex cache": Davidovič, Křivánek, Hašan and Slusallek 2014). Multiple importance sampling weighs
-//! connections against light sampling and against meeting lights by chance (Veach 1997, chapter 10), with the sums over
-//! strategies kept along both paths (Georgiev, "Implementing Vertex Connection and Merging", 2012). There are no
-//! connections to the camera itself.
+//! The vertices of many light paths are stored; every vertex of a camera path is connected to one of them, chosen by
+//! [`ConnectionTables`] ("light vertex cache": Davidovič, Křivánek, Hašan and Slusallek 2014). Multiple importance
+//! sampling weighs connections against light sampling and against meeting lights by chance (Veach 1997, chapter 10),
+//! with the sums over strategies kept along both paths (Georgiev, "Implementing Vertex Connection and Merging", 2012).
+//! There are no connections to the camera itself.
 //!
 //! The sample index of a camera path decides on the light paths that it is connected to: each epoch of [`EPOCH`]
 //! samples has its own, which depend on the seed and on the epoch alone.
 //!
 //! [`EPOCH`]: super::EPOCH
 
+mod connection_tables;
 mod emitters;
 
+pub use connection_tables::{ChosenVertex, ClusteredVertices, ConnectionTables};
 pub use emitters::Emitters;
 
 use crate::bsdf::Bsdf;
@@ -23,7 +25,7 @@ use crate::math::{Frame, Vec3};
 
 /// Connections of a vertex of a camera path over the light paths' vertices per path, as MIS weights take them: any
 /// constant is unbiased.
-pub const CONNECTIONS_PER_VERTEX: f64 = 0.4;
+pub const CONNECTIONS_PER_VERTEX: f64 = 1.5;
 
 /// Where a light path meets a surface. Aligned, so that it is in two lines of the caches.
 #[derive(Clone, Debug)]
@@ -89,6 +91,10 @@ pub struct LightPaths<'a> {
     pub emitters: &'a Emitters,
     /// Their vertices.
     pub vertices: &'a [LightVertex],
+    /// By which they are chosen.
+    pub tables: &'a ConnectionTables,
+    /// The same vertices by cluster.
+    pub clustered: &'a ClusteredVertices,
     /// The number of paths.
     pub traced: u32,
     /// Whether [`Workspace::pilot_moments`](super::Workspace::pilot_moments) are wanted.

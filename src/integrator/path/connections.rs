@@ -10,7 +10,7 @@ use super::evals::Surfaces;
 use super::wave::Wave;
 use crate::color::Rgb;
 use crate::geometry::SpawnPoint;
-use crate::integrator::bidirectional::{LightVertex, PartialMis, Scattering, bounded, squared};
+use crate::integrator::bidirectional::{ChosenVertex, LightPaths, PartialMis, Scattering, bounded, squared};
 use crate::integrator::dimensions;
 use crate::integrator::vertex::HemisphereTest;
 use crate::light::LightSampleRows;
@@ -24,6 +24,8 @@ soa! {
     pub(super) struct LightVertexRows {
         /// Whether the vertices can be connected.
         is_chosen: u32,
+        /// One over the probability of the choice.
+        inverse_probability: f32,
         /// The next seven as in [`LightVertex`].
         n: Vec3,
         error: f32,
@@ -52,7 +54,7 @@ pub(super) fn sample(context: &Context, wave: &mut Wave, block: usize) {
         return;
     }
     draw(context, wave);
-    let scatterings = choose(context, wave, light_paths.vertices);
+    let scatterings = choose(context, wave, light_paths);
     let Wave { vertices, connection_ends: ends, connection_mis, bsdf_rows, .. } = wave;
     let Vertices { count, rows, points, light_samples, light_evals, direct, bsdfs, non_diffuse, .. } = vertices;
     vectorize!(find_directions(points, light_samples, ends, *count));
@@ -66,7 +68,7 @@ pub(super) fn sample(context: &Context, wave: &mut Wave, block: usize) {
     surfaces.eval(&light_samples.direction, is_wanted, bsdf_rows, light_evals);
     let ConnectionMis { mis, densities } = connection_mis;
     surfaces.reversed_pdfs(&light_evals.wi, is_wanted, bsdf_rows, &mut densities.reversed);
-    let per_path = light_paths.vertices.len() as f32 / light_paths.traced as f32;
+    let per_path = 1.0 / light_paths.traced as f32;
     let pairs = Pairs { rows, points, lights: light_samples, evals: light_evals, ends, mis, per_path };
     if context.scene.features.normal_perturbations {
         vectorize!(connect::<true>(&pairs, densities, direct, *count));
@@ -102,21 +104,32 @@ fn draw(context: &Context, wave: &mut Wave) {
 
 /// Chooses a vertex of a light path for each vertex, if they can be connected; the result is how those that are not
 /// diffuse scatter light.
-fn choose<'a>(context: &Context, wave: &mut Wave, all: &'a [LightVertex]) -> [Option<&'a Scattering>; BATCH] {
+fn choose<'a>(context: &Context, wave: &mut Wave, light_paths: &LightPaths<'a>) -> [Option<&'a Scattering>; BATCH] {
+    let LightPaths { vertices: all, tables, clustered, .. } = *light_paths;
     let Wave { vertices, connection_ends: ends, connection_mis: ConnectionMis { mis, .. }, .. } = wave;
     let mut indices = [0; BATCH];
+    let mut of_lanes = [0; BATCH];
+    for (lane, table) in of_lanes.iter_mut().enumerate().take(vertices.count) {
+        *table = tables.table(vertices.points.p.get(lane).as_vec3(), vertices.facing_normal(lane));
+    }
     for (lane, index) in indices.iter_mut().enumerate().take(vertices.count) {
         let [u, digits, ..] = vertices.u_light.of(lane);
         // Random numbers are multiples of 2^-24.
         let u = f64::from(u) + f64::from(digits) * (1.0 / 16_777_216.0);
-        *index = ((u * all.len() as f64) as usize).min(all.len() - 1);
+        let choice = tables.choose(of_lanes[lane], clustered, u);
+        // In an empty cluster there is nothing to connect to.
+        let ChosenVertex { index: chosen, inverse_probability } =
+            choice.unwrap_or(ChosenVertex { index: 0, inverse_probability: 0.0 });
+        (*index, ends.inverse_probability[lane]) = (chosen, inverse_probability);
         prefetch(all, *index);
     }
     let mut scatterings = [None; BATCH];
     for (lane, scattering) in scatterings.iter_mut().enumerate().take(vertices.count) {
         let vertex = &all[indices[lane]];
         let is_short = context.bounce + 2 + vertex.segments <= context.config.max_depth;
-        let is_chosen = is_short && vertices.rows.flags[lane] & vertex_flags::UNSAMPLED == 0;
+        let is_chosen = is_short
+            && ends.inverse_probability[lane] > 0.0
+            && vertices.rows.flags[lane] & vertex_flags::UNSAMPLED == 0;
         ends.is_chosen[lane] = u32::from(is_chosen);
         *scattering = vertex.scattering.as_deref().filter(|_| is_chosen);
         if let Some(scattering) = scattering {
@@ -175,7 +188,7 @@ struct Pairs<'a> {
     evals: &'a EvalRows,
     ends: &'a LightVertexRows,
     mis: &'a MisRows,
-    /// Vertices of a light path.
+    /// One over the number of light paths.
     per_path: f32,
 }
 
@@ -204,7 +217,7 @@ fn connect<const PERTURBED: bool>(pairs: &Pairs, densities: &mut DensityRows, di
         let by_light = squared(ends.pdf_to_vertex[i] * cos / distance_squared) * of_camera.sum(densities.reversed[i]);
         let weight = (1.0 / (1.0 + bounded(by_camera + by_light))) as f32;
         densities.weight[i] = weight;
-        let contribution = light * (weight * per_path);
+        let contribution = light * (weight * per_path * ends.inverse_probability[i]);
         direct.contribution.set(i, contribution);
         let is_lit = (ends.is_chosen[i] != 0) & !contribution.is_black() & contribution.is_finite();
         direct.status[i] = spawn::status(is_lit & test.agrees() & light_test.agrees(), false);

@@ -1,0 +1,381 @@
+//! Which light vertices are worth connecting to, by place: most are hidden from most of a scene. Vertices are grouped
+//! into clusters, which are chosen by what those of a pilot would add to points near the camera path's vertex,
+//! visibility included ("Importance Caching for Complex Illumination", Georgiev, Křivánek, Popov and Slusallek 2012,
+//! for single vertices at single points).
+
+use std::f32::consts::FRAC_1_PI;
+
+use rayon::prelude::*;
+
+use super::{LightVertex, bounded, squared};
+use crate::accel::Accelerator;
+use crate::math::prefetch::prefetch;
+use crate::math::random::hash64;
+use crate::math::{Aabb, Vec3};
+
+/// Levels of the tree of clusters.
+const LEVELS: u32 = 7;
+
+/// Clusters of light vertices.
+const CLUSTERS: usize = 1 << LEVELS;
+
+/// Cells along the longest axis of the grid, a multiple of 2.
+const GRID_SIDE: usize = 16;
+
+/// Octants of normals.
+const OCTANTS: usize = 8;
+
+/// The fewest and the most pairs of a point of a cell and a vertex of a cluster that are compared.
+const PAIRS: [u64; 2] = [1, 16];
+
+/// As many pairs as the mean of the eight cells around a cell counts for, beside its own.
+const PRIOR_PAIRS: f32 = 2.0;
+
+/// The part of the connections for which clusters have equal probabilities.
+const UNIFORM_FRACTION: f32 = 0.25;
+
+/// What the probabilities of clusters are multiples of one over.
+const PROBABILITY_STEPS: u32 = 1 << 16;
+
+/// The sum of the probabilities of the clusters before each, in steps.
+type ClusterCdf = [u16; CLUSTERS];
+
+/// A binary tree over places, in levels; a node has the axis and the coordinate of its split.
+type Splits = Vec<(u8, f32)>;
+
+/// Probabilities of clusters by place and side.
+#[derive(Clone, Debug)]
+pub struct ConnectionTables {
+    splits: Splits,
+    corner: Vec3,
+    cells_per_unit: f32,
+    /// By cell, an index into the tables.
+    table_indices: Vec<u32>,
+    /// The first is that of cells of which nothing is known.
+    tables: Vec<ClusterCdf>,
+}
+
+/// Light vertices by cluster.
+#[derive(Clone, Debug)]
+pub struct ClusteredVertices {
+    /// Indices of vertices, cluster by cluster.
+    order: Vec<u32>,
+    /// Where each cluster begins in `order`, and where the last ends.
+    starts: Vec<u32>,
+}
+
+/// A light vertex that was chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChosenVertex {
+    /// Its index.
+    pub index: usize,
+    /// One over the probability of the choice.
+    pub inverse_probability: f32,
+}
+
+impl ConnectionTables {
+    /// From the light vertices of a pilot, with about this many shadow rays.
+    pub fn new(pilot: &[LightVertex], accel: &dyn Accelerator, rays: u64) -> Self {
+        let bounds = bounds_of(pilot.iter().map(place));
+        let size = bounds.size().max_element();
+        let mut indices: Vec<u32> = (0..pilot.len() as u32).collect();
+        let mut splits = vec![(0, f32::INFINITY); CLUSTERS - 1];
+        split(pilot, &mut indices, 0, &mut splits);
+        let mut tables = Self {
+            splits,
+            corner: bounds.min,
+            cells_per_unit: if size > 0.0 && size < f32::INFINITY { GRID_SIDE as f32 / size } else { 0.0 },
+            table_indices: vec![0; GRID_SIDE.pow(3) * OCTANTS],
+            tables: Vec::new(),
+        };
+        let clustered = tables.clustered(pilot);
+        tables.tables.push(cdf_of([0.0; CLUSTERS], &clustered));
+        let cell = |vertex: &LightVertex| tables.cell(place(vertex), facing_normal(vertex)) as u32;
+        let mut by_cell: Vec<(u32, u32)> = pilot.iter().map(cell).zip(0..).collect();
+        by_cell.sort_unstable();
+        let cells: Vec<&[(u32, u32)]> = by_cell.chunk_by(|a, b| a.0 == b.0).collect();
+        let pairs = (rays / (cells.len() * CLUSTERS).max(1) as u64).clamp(PAIRS[0], PAIRS[1]) as u32;
+        let squares: Vec<_> =
+            cells.par_iter().map(|cell| mean_squares(pilot, &clustered, cell, pairs, accel)).collect();
+        let mut around = vec![([0.0; CLUSTERS], 0.0); (GRID_SIDE / 2).pow(3) * OCTANTS];
+        for (cell, squares) in cells.iter().zip(&squares) {
+            let (sums, count) = &mut around[parent(cell[0].0 as usize)];
+            sums.iter_mut().zip(squares).for_each(|(sum, square)| *sum += square);
+            *count += 1.0;
+        }
+        for (cell, squares) in cells.iter().zip(&squares) {
+            let (sums, count) = &around[parent(cell[0].0 as usize)];
+            let root = |i: usize| (pairs as f32 * squares[i] + PRIOR_PAIRS * sums[i] / count).sqrt();
+            tables.table_indices[cell[0].0 as usize] = tables.tables.len() as u32;
+            tables.tables.push(cdf_of(std::array::from_fn(root), &clustered));
+        }
+        tables
+    }
+
+    /// The vertices by cluster.
+    pub fn clustered(&self, vertices: &[LightVertex]) -> ClusteredVertices {
+        let clusters: Vec<u8> = vertices.par_iter().map(|vertex| self.cluster(place(vertex)) as u8).collect();
+        let mut starts = vec![0; CLUSTERS + 1];
+        clusters.iter().for_each(|&cluster| starts[usize::from(cluster) + 1] += 1);
+        for cluster in 0..CLUSTERS {
+            starts[cluster + 1] += starts[cluster];
+        }
+        let mut ends = starts.clone();
+        let mut order = vec![0; vertices.len()];
+        for (&cluster, i) in clusters.iter().zip(0..) {
+            let end = &mut ends[usize::from(cluster)];
+            order[*end as usize] = i;
+            *end += 1;
+        }
+        ClusteredVertices { order, starts }
+    }
+
+    /// The index of the table for a point with this facing normal.
+    #[inline]
+    pub fn table(&self, p: Vec3, n: Vec3) -> usize {
+        let index = self.table_indices[self.cell(p, n)] as usize;
+        prefetch(&self.tables, index);
+        index
+    }
+
+    /// A vertex to connect a point of a table to, by a number in `[0, 1)`; `None` if the chosen cluster is empty.
+    #[inline]
+    pub fn choose(&self, table: usize, vertices: &ClusteredVertices, u: f64) -> Option<ChosenVertex> {
+        let cdf = &self.tables[table];
+        let u = u * f64::from(PROBABILITY_STEPS);
+        let step = u as u16;
+        // The first begins at 0. All are compared: the processor does many at once, and could not predict a search.
+        let cluster = cdf.iter().map(|&start| u16::from(start <= step)).sum::<u16>() as usize - 1;
+        let start = u32::from(cdf[cluster]);
+        let end = cdf.get(cluster + 1).map_or(PROBABILITY_STEPS, |&end| u32::from(end));
+        let steps = end - start;
+        let first = vertices.starts[cluster];
+        let count = vertices.starts[cluster + 1] - first;
+        let within = (u - f64::from(start)) * f64::from(count) / f64::from(steps);
+        let last = count.checked_sub(1)?;
+        let index = vertices.order[(first + (within as u32).min(last)) as usize] as usize;
+        Some(ChosenVertex { index, inverse_probability: count as f32 * (PROBABILITY_STEPS as f32 / steps as f32) })
+    }
+
+    /// The cell and side of a point, nearest to it where the grid has ended.
+    #[inline(always)]
+    fn cell(&self, p: Vec3, n: Vec3) -> usize {
+        const LAST: f32 = (GRID_SIDE - 1) as f32;
+        // NaN becomes 0.
+        let at = |k: usize| ((p[k] - self.corner[k]) * self.cells_per_unit).clamp(0.0, LAST) as usize;
+        let octant = usize::from(n.x < 0.0) | usize::from(n.y < 0.0) << 1 | usize::from(n.z < 0.0) << 2;
+        ((at(2) * GRID_SIDE + at(1)) * GRID_SIDE + at(0)) * OCTANTS + octant
+    }
+
+    #[inline(always)]
+    fn cluster(&self, p: Vec3) -> usize {
+        let mut node = 0;
+        for _ in 0..LEVELS {
+            let (axis, at) = self.splits[node];
+            node = 2 * node + 1 + usize::from(p[usize::from(axis)] >= at);
+        }
+        node - (CLUSTERS - 1)
+    }
+}
+
+fn place(vertex: &LightVertex) -> Vec3 {
+    vertex.point.p.as_vec3()
+}
+
+/// The normal on the side of the light that arrives.
+fn facing_normal(vertex: &LightVertex) -> Vec3 {
+    vertex.point.n * 1f32.copysign(vertex.cos_geometric)
+}
+
+fn bounds_of(points: impl Iterator<Item = Vec3>) -> Aabb {
+    points.fold(Aabb::EMPTY, |bounds, p| bounds.extended(p))
+}
+
+/// Splits vertices about in halves along the longest axis, level by level.
+fn split(pilot: &[LightVertex], indices: &mut [u32], node: usize, splits: &mut Splits) {
+    let place = |i: &u32| place(&pilot[*i as usize]);
+    let bounds = bounds_of(indices.iter().map(place));
+    let size = bounds.size();
+    if node >= splits.len() || !(size.max_element() > 0.0) {
+        return;
+    }
+    let axis = (0..3).max_by(|&a, &b| size[a].total_cmp(&size[b])).unwrap_or(0);
+    indices.sort_unstable_by(|a, b| place(a)[axis].total_cmp(&place(b)[axis]));
+    let at = |i: usize| place(&indices[i])[axis];
+    // Many have the same coordinate, as on floors: neither side is to be empty.
+    let middle = indices.partition_point(|i| place(i)[axis] < at(indices.len() / 2));
+    let first = if middle > 0 { middle } else { indices.partition_point(|i| place(i)[axis] <= bounds.min[axis]) };
+    splits[node] = (axis as u8, at(first));
+    let (below, above) = indices.split_at_mut(first);
+    split(pilot, below, 2 * node + 1, splits);
+    split(pilot, above, 2 * node + 2, splits);
+}
+
+/// The cell of twice the size around a cell, with the same octant.
+fn parent(cell: usize) -> usize {
+    let (octant, cell) = (cell % OCTANTS, cell / OCTANTS);
+    let [x, y, z] = [cell % GRID_SIDE, cell / GRID_SIDE % GRID_SIDE, cell / GRID_SIDE.pow(2)].map(|at| at / 2);
+    ((z * GRID_SIDE / 2 + y) * GRID_SIDE / 2 + x) * OCTANTS + octant
+}
+
+/// The mean squares of what the vertices of each cluster add to points of a cell, both by index.
+fn mean_squares(
+    pilot: &[LightVertex],
+    clustered: &ClusteredVertices,
+    cell: &[(u32, u32)],
+    pairs: u32,
+    accel: &dyn Accelerator,
+) -> [f32; CLUSTERS] {
+    let mut counter = u64::from(cell[0].0) << 32;
+    let mut below = |count: usize| {
+        counter += 1;
+        ((hash64(counter) >> 32) as usize * count) >> 32
+    };
+    let mut squares = [0.0; CLUSTERS];
+    for (square, range) in squares.iter_mut().zip(clustered.starts.windows(2)) {
+        let vertices = &clustered.order[range[0] as usize..range[1] as usize];
+        for _ in 0..if vertices.is_empty() { 0 } else { pairs } {
+            let (_, at) = cell[below(cell.len())];
+            let light = vertices[below(vertices.len())];
+            let contribution = contribution(&pilot[at as usize], &pilot[light as usize], accel);
+            *square += contribution * contribution / pairs as f32;
+        }
+    }
+    squares
+}
+
+/// What a light vertex adds to a diffuse point, both taken as diffuse, weighted by MIS.
+fn contribution(at: &LightVertex, light: &LightVertex, accel: &dyn Accelerator) -> f32 {
+    let toward = (light.point.p - at.point.p).as_vec3();
+    let distance_squared = toward.length_squared();
+    let direction = toward * (1.0 / distance_squared.sqrt());
+    let (cos, cos_light) = (facing_normal(at).dot(direction), -facing_normal(light).dot(direction));
+    // Not where the points are the same, either.
+    if !(cos > 0.0 && cos_light > 0.0) || accel.occluded(&at.point.ray_to(&light.point)) {
+        return 0.0;
+    }
+    let geometry = cos_light / distance_squared;
+    let by_camera = squared(FRAC_1_PI * cos * geometry) * light.mis.sum(FRAC_1_PI * light.cos_shading.abs());
+    let weight = (1.0 / (1.0 + bounded(by_camera))) as f32;
+    let contribution = light.flux.max_channel() * cos * geometry * weight;
+    if contribution < f32::INFINITY { contribution } else { 0.0 }
+}
+
+/// Probabilities mostly in proportion to values, and nowhere zero.
+fn cdf_of(values: [f32; CLUSTERS], clustered: &ClusteredVertices) -> ClusterCdf {
+    // One vertex more in each cluster: later light paths have some where the pilot has none.
+    let count = |cluster: usize| (clustered.starts[cluster + 1] - clustered.starts[cluster] + 1) as f32;
+    let all = (clustered.order.len() + CLUSTERS) as f32;
+    let value = |cluster: usize| count(cluster) * values[cluster];
+    let sum: f32 = (0..CLUSTERS).map(value).sum();
+    let is_known = sum > 0.0 && sum < f32::INFINITY;
+    let uniform_fraction = if is_known { UNIFORM_FRACTION } else { 1.0 };
+    let mut before = 0.0;
+    std::array::from_fn(|cluster| {
+        let start = before * (PROBABILITY_STEPS - CLUSTERS as u32) as f32;
+        let known = if is_known { (1.0 - uniform_fraction) * value(cluster) / sum } else { 0.0 };
+        before += uniform_fraction * count(cluster) / all + known;
+        // At least one step each.
+        start as u16 + cluster as u16
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::Rgb;
+    use crate::geometry::Hit;
+    use crate::geometry::SpawnPoint;
+    use crate::id::LightId;
+    use crate::integrator::bidirectional::PartialMis;
+    use crate::math::{DVec3, Ray};
+
+    /// The plane x = 0.
+    struct Wall;
+
+    impl Accelerator for Wall {
+        fn intersect(&self, _: &Ray) -> Option<Hit> {
+            None
+        }
+
+        fn occluded(&self, ray: &Ray) -> bool {
+            (ray.origin.x > 0.0) != ((ray.origin + ray.direction).x > 0.0)
+        }
+
+        fn bounds(&self) -> Aabb {
+            Aabb::EMPTY
+        }
+
+        fn memory_bytes(&self) -> usize {
+            0
+        }
+
+        fn description(&self) -> String {
+            String::new()
+        }
+    }
+
+    /// The floors, or the ceilings, of two rooms of the unit size beside the wall.
+    fn rooms(is_floor: bool) -> Vec<LightVertex> {
+        let sign = if is_floor { 1.0 } else { -1.0 };
+        let n = Vec3::new(0.0, sign, 0.0);
+        let vertex = |i: u64| {
+            let u = |k: u64| (hash64(2 * i + k) >> 40) as f64 / f64::from(1 << 24);
+            LightVertex {
+                point: SpawnPoint { p: DVec3::new(2.0 * u(0) - 1.0, 0.5 - 0.5 * f64::from(sign), u(1)), n, error: 0.0 },
+                n,
+                cos_geometric: 0.5,
+                cos_shading: 0.5,
+                cos_normals: 0.0,
+                flux: Rgb::splat(1.0),
+                scattering: None,
+                light: LightId(0),
+                segments: 1,
+                mis: PartialMis::default(),
+                unconnected: PartialMis::default(),
+            }
+        };
+        (0..4096).map(|i| vertex(if is_floor { i } else { i + 4096 })).collect()
+    }
+
+    #[test]
+    fn vertices_that_are_seen_are_chosen_more_often_and_all_with_their_probabilities() {
+        let vertices = [rooms(true), rooms(false)].concat();
+        let tables = ConnectionTables::new(&vertices, &Wall, 1_000_000);
+        let clustered = tables.clustered(&vertices);
+        const CHOICES: u32 = 1 << 16;
+        for at in &vertices[..16] {
+            let (mut seen, mut weights, mut chosen) = (0, 0.0, vec![false; vertices.len()]);
+            for i in 0..CHOICES {
+                let u = (f64::from(i) + 0.5) / f64::from(CHOICES);
+                let choice = tables.choose(tables.table(place(at), facing_normal(at)), &clustered, u).unwrap();
+                let light = &vertices[choice.index];
+                seen += u32::from(contribution(at, light, &Wall) > 0.0);
+                weights += f64::from(choice.inverse_probability);
+                chosen[choice.index] = true;
+            }
+            // A quarter of the vertices is seen: the ceiling of the same room.
+            assert!(f64::from(seen) > 0.7 * f64::from(CHOICES), "{seen}");
+            assert!((weights / f64::from(CHOICES) / vertices.len() as f64 - 1.0).abs() < 1e-3, "{weights}");
+            assert!(chosen.iter().all(|&chosen| chosen));
+        }
+    }
+
+    #[test]
+    fn points_apart_from_the_pilot_and_odd_pilots_have_choices() {
+        let vertices = rooms(true);
+        let one = ConnectionTables::new(&vertices[..1], &Wall, 100);
+        let clustered = one.clustered(&vertices);
+        for p in [Vec3::splat(1e30), Vec3::splat(f32::NAN), Vec3::ZERO] {
+            for u in [0.0, 0.5, 1.0f64.next_down()] {
+                let choice = one.choose(one.table(p, Vec3::Z), &clustered, u);
+                assert!(choice.is_none_or(|choice| choice.index < vertices.len()), "{p} {u}");
+            }
+        }
+        // None of its clusters but those of the first vertex are there.
+        let few = one.clustered(&vertices[..1]);
+        let table = one.table(Vec3::ZERO, Vec3::Y);
+        let found = (0..1000).filter(|&i| one.choose(table, &few, f64::from(i) / 1000.0).is_some());
+        assert!((1..1000).contains(&found.count()));
+    }
+}
