@@ -19,8 +19,10 @@ const PATHS_PER_PIXEL: f64 = 0.5;
 /// The fewest and the most light paths traced in an epoch; the most take 200 MB.
 const PATHS: RangeInclusive<f64> = 16_384.0..=250_000.0;
 
-/// Shadow rays by which it is found how their vertices are to be chosen, by pixel of the picture.
-const TABLE_RAYS_PER_PIXEL: f64 = 8.0;
+/// Shadow rays by which it is found how their vertices are to be chosen, by pixel of the picture, for the picture and
+/// for the pilot that decides whether it has connections.
+const TABLE_RAYS_PER_PIXEL: u64 = 8;
+const PILOT_TABLE_RAYS_PER_PIXEL: u64 = 1;
 
 /// The index of the light paths of that pilot, beyond all epochs.
 const TABLE_EPOCH: u32 = u32::MAX;
@@ -61,19 +63,15 @@ impl LightPathPass {
         let emitters = Emitters::new(scene)?;
         let [width, height] = settings.size.map(f64::from);
         let traced = (PATHS_PER_PIXEL * width * height).clamp(*PATHS.start(), *PATHS.end()) as u32;
-        let table_rays = (TABLE_RAYS_PER_PIXEL * width * height) as u64;
+        let table_rays = TABLE_RAYS_PER_PIXEL * (width * height) as u64;
         Some(Self { emitters, is_pilot: false, traced, table_rays, tables: None, vertices: None })
-    }
-
-    /// The tables are those that the pilot has found.
-    pub fn take_tables(&mut self, pilot: Self) {
-        self.tables = pilot.tables;
     }
 
     /// As many light paths as a pilot needs.
     pub fn for_pilot(&self) -> Self {
         let (emitters, traced) = (self.emitters.clone(), self.pilot_paths());
-        Self { emitters, is_pilot: true, traced, table_rays: self.table_rays, tables: None, vertices: None }
+        let table_rays = self.table_rays / TABLE_RAYS_PER_PIXEL * PILOT_TABLE_RAYS_PER_PIXEL;
+        Self { emitters, is_pilot: true, traced, table_rays, tables: None, vertices: None }
     }
 
     /// Light paths of an epoch over those of the pilot.

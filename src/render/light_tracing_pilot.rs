@@ -34,7 +34,7 @@ struct GainBound {
 const WORTHWHILE: GainBound = GainBound { left_out: 0.002, deviations: 1.0 };
 
 /// For which of two methods that are is better.
-const COMPARISON: GainBound = GainBound { left_out: 0.02, deviations: 2.0 };
+const COMPARISON: GainBound = GainBound { left_out: 0.05, deviations: 2.0 };
 
 /// A pilot being traced, with samples without any method.
 struct Pilot<'a, 'b> {
@@ -45,22 +45,20 @@ struct Pilot<'a, 'b> {
 
 /// What lowers the error by more than it costs, and by most, of what `renderer` has.
 pub(super) fn choose(renderer: &mut TileRenderer, workspaces: &[Mutex<TileWorkspace>]) -> LightTracing {
-    let (mut light_paths, caustics) = (renderer.light_paths.take(), renderer.caustics.take());
+    let (light_paths, caustics) = (renderer.light_paths.take(), renderer.caustics.take());
     if light_paths.is_none() && caustics.is_none() {
         return LightTracing::Off;
     }
     let unidirectional = trace(renderer, UNIDIRECTIONAL_SAMPLES, workspaces);
     let mut pilot = Pilot { renderer, workspaces, unidirectional };
     let (mut choice, mut best) = (LightTracing::Off, None);
-    if let Some(light_paths) = &mut light_paths {
+    if let Some(light_paths) = &light_paths {
         pilot.renderer.light_paths = Some(light_paths.for_pilot());
         let efficiency = pilot.efficiency(light_paths.per_pilot_path());
         if efficiency > best {
             (choice, best) = (LightTracing::Bidirectional, efficiency);
         }
-        if let Some(pilot) = pilot.renderer.light_paths.take() {
-            light_paths.take_tables(pilot);
-        }
+        pilot.renderer.light_paths = None;
     }
     if let Some(caustics) = caustics {
         let per_pilot_photon = caustics.per_pilot_photon();

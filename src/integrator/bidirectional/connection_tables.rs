@@ -94,20 +94,31 @@ impl ConnectionTables {
         let mut by_cell: Vec<(u32, u32)> = pilot.iter().map(cell).zip(0..).collect();
         by_cell.sort_unstable();
         let cells: Vec<&[(u32, u32)]> = by_cell.chunk_by(|a, b| a.0 == b.0).collect();
-        let pairs = (rays / (cells.len() * CLUSTERS).max(1) as u64).clamp(PAIRS[0], PAIRS[1]) as u32;
-        let squares: Vec<_> =
-            cells.par_iter().map(|cell| mean_squares(pilot, &clustered, cell, pairs, accel)).collect();
+        // With fewer rays than cells and clusters, some cells take the mean of those around them.
+        let per_cluster = rays / CLUSTERS as u64;
+        let pairs = (per_cluster / cells.len().max(1) as u64).clamp(PAIRS[0], PAIRS[1]) as u32;
+        let step = (cells.len() as u64).div_ceil(per_cluster.max(1)).max(1) as usize;
+        let is_compared = |i: usize| i % step == 0;
+        let squares: Vec<_> = cells
+            .par_iter()
+            .enumerate()
+            .map(|(i, cell)| is_compared(i).then(|| mean_squares(pilot, &clustered, cell, pairs, accel)))
+            .collect();
         let mut around = vec![([0.0; CLUSTERS], 0.0); (GRID_SIDE / 2).pow(3) * OCTANTS];
         for (cell, squares) in cells.iter().zip(&squares) {
+            let Some(squares) = squares else { continue };
             let (sums, count) = &mut around[parent(cell[0].0 as usize)];
             sums.iter_mut().zip(squares).for_each(|(sum, square)| *sum += square);
             *count += 1.0;
         }
         for (cell, squares) in cells.iter().zip(&squares) {
             let (sums, count) = &around[parent(cell[0].0 as usize)];
-            let root = |i: usize| (pairs as f32 * squares[i] + PRIOR_PAIRS * sums[i] / count).sqrt();
-            tables.table_indices[cell[0].0 as usize] = tables.tables.len() as u32;
-            tables.tables.push(cdf_of(std::array::from_fn(root), &clustered));
+            if *count > 0.0 {
+                let own = |i: usize| squares.as_ref().map_or(0.0, |squares| pairs as f32 * squares[i]);
+                let root = |i: usize| (own(i) + PRIOR_PAIRS * sums[i] / count).sqrt();
+                tables.table_indices[cell[0].0 as usize] = tables.tables.len() as u32;
+                tables.tables.push(cdf_of(std::array::from_fn(root), &clustered));
+            }
         }
         tables
     }
