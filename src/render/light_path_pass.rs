@@ -19,12 +19,12 @@ const PATHS_PER_PIXEL: f64 = 0.5;
 /// The fewest and the most light paths traced in an epoch; the most take 200 MB.
 const PATHS: RangeInclusive<f64> = 16_384.0..=250_000.0;
 
-/// Shadow rays by which it is found how their vertices are to be chosen, by pixel of the picture, for the picture and
-/// for the pilot that decides whether it has connections.
+/// Shadow rays for the tables by which vertices are chosen, by pixel of the picture: for the picture, and for the pilot
+/// that decides whether paths are connected.
 const TABLE_RAYS_PER_PIXEL: u64 = 8;
 const PILOT_TABLE_RAYS_PER_PIXEL: u64 = 1;
 
-/// The index of the light paths of that pilot, beyond all epochs.
+/// The epoch of the light paths that the tables are made from, beyond those of samples.
 const TABLE_EPOCH: u32 = u32::MAX;
 
 /// Traces light paths and keeps those of one epoch.
@@ -36,7 +36,7 @@ pub(super) struct LightPathPass {
     traced: u32,
     /// Shadow rays for the tables.
     table_rays: u64,
-    /// How vertices are chosen, once it has been found.
+    /// By which vertices are chosen; made with the first epoch.
     tables: Option<ConnectionTables>,
     /// The epoch, and the vertices of its paths.
     vertices: Option<(u32, Vec<LightVertex>, ClusteredVertices)>,
@@ -104,9 +104,9 @@ impl LightPathPass {
         if self.vertices.as_ref().is_some_and(|(known, ..)| *known == epoch) {
             return RayCounts::default();
         }
-        // Beyond all pixels, and beside the photons' seeds.
         let pilot_paths = self.pilot_paths();
         let trace = |epoch: u32, count: u32| {
+            // Beyond all pixels, and beside the photons' seeds.
             let seed: PixelSeed = sampler.pixel(epoch, u32::MAX - 1);
             trace_parts(count, workspaces, |indices, workspace, vertices| {
                 integrator.trace_light_paths(pass, &self.emitters, &PhotonRange { seed, indices }, workspace, vertices);
