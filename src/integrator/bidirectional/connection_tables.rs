@@ -98,7 +98,7 @@ impl ConnectionTables {
         let per_cluster = rays / CLUSTERS as u64;
         let pairs = (per_cluster / cells.len().max(1) as u64).clamp(PAIRS[0], PAIRS[1]) as u32;
         let step = (cells.len() as u64).div_ceil(per_cluster.max(1)).max(1) as usize;
-        let is_compared = |i: usize| i % step == 0;
+        let is_compared = |i: usize| i.is_multiple_of(step);
         let squares: Vec<_> = cells
             .par_iter()
             .enumerate()
