@@ -26,7 +26,7 @@ soa! {
         is_chosen: u32,
         /// One over the probability of the choice.
         inverse_probability: f32,
-        /// The next seven as in [`LightVertex`].
+        /// The next seven as in [`LightVertex`](crate::integrator::LightVertex).
         n: Vec3,
         error: f32,
         n_s: Vec3,
