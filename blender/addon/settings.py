@@ -47,10 +47,11 @@ class Settings(bpy.types.PropertyGroup):
     )
     roulette: bpy.props.EnumProperty(
         name="Roulette",
-        description="When Russian roulette may end a path",
+        description="Which paths and shadow rays Russian roulette terminates",
         items=[
             ("auto", "Automatic", "By what the path may add to its pixel and by what it costs"),
             ("throughput", "Throughput", "By the throughput of the path"),
+            ("shadow_rays", "Shadow rays", "Shadow rays by what they carry; no paths"),
             ("off", "Off", "Never"),
         ],
     )

@@ -218,8 +218,8 @@ pub enum IntegratorDesc {
         /// Segments before Russian roulette by throughput may end a path. Default: 5.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         rr_depth: Option<u32>,
-        /// What Russian roulette decides about. Default: auto; where `rr_depth` is given throughput, or shadow_rays if
-        /// it keeps paths of more than six segments from being ended before the last.
+        /// Which paths and shadow rays Russian roulette terminates. Default: auto; where `rr_depth` is given
+        /// throughput, or shadow_rays if it is at least `max_depth` - 1 and `max_depth` is above 6.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         roulette: Option<RouletteDesc>,
         /// How many lights are sampled at the first surface or point in a medium that a path meets, from 1 to 64.
@@ -327,7 +327,7 @@ impl IntegratorDesc {
         }
     }
 
-    /// What Russian roulette decides about; `None` where there are no paths.
+    /// Which paths and shadow rays Russian roulette terminates; `None` where there are no paths.
     pub fn roulette(&self) -> Option<RouletteDesc> {
         let Self::Path { max_depth, roulette, rr_depth, .. } = *self else { return None };
         let default = match rr_depth {
@@ -397,7 +397,7 @@ pub enum CausticsDesc {
     Photons,
 }
 
-/// What Russian roulette decides about. All give the same picture; they differ in noise and time.
+/// Which paths and shadow rays Russian roulette terminates. All give the same picture; they differ in noise and time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RouletteDesc {
@@ -406,9 +406,9 @@ pub enum RouletteDesc {
     /// From the second scattering on, by what a path may add to its pixel and by what it costs, as a pilot of an eighth
     /// of a sample of each pixel finds both; shadow rays by what they carry. `rr_depth` is ignored.
     Auto,
-    /// Shadow rays by what they carry, as with auto; paths are never ended. `rr_depth` is ignored.
+    /// Shadow rays by what they carry, as with auto; no paths. `rr_depth` is ignored.
     ShadowRays,
-    /// Nothing.
+    /// None.
     Off,
 }
 

@@ -12,6 +12,7 @@ mod debug;
 mod emitter_prims;
 mod light_events;
 mod media;
+mod octant_grid;
 mod participating;
 mod path;
 mod regularization;

@@ -2,15 +2,16 @@
 //! without splitting): a path goes on with a probability in proportion to what it may still add to the error of its
 //! pixel, over the root of what going on costs.
 
+use super::octant_grid::{OctantGrid, cell_count};
 use crate::desc::DEFAULT_RR_DEPTH;
 use crate::math::rows::{BATCH, DVec3Rows, Row, Vec3Rows};
 use crate::math::vectorize::vectorize;
 use crate::math::{Aabb, Vec3};
 
-/// What Russian roulette decides about.
+/// Which paths and shadow rays Russian roulette terminates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Roulette {
-    /// Nothing.
+    /// None.
     Off,
     /// From this many segments on, by the throughput.
     Throughput {
@@ -108,9 +109,6 @@ impl PilotRecords {
 /// Cells along the longest axis, by level; each level has the cells of the one before in parts.
 const LEVELS: [usize; 3] = [2, 8, 32];
 
-/// Directions of normals that are told apart: octants.
-const SIDES: usize = 8;
-
 /// As many records as this give the level above in a cell's estimate.
 const PRIOR_RECORDS: f64 = 8.0;
 
@@ -123,9 +121,8 @@ const OUTLIERS: f64 = 0.005;
 /// By where a path is scattered, the root of the mean squared radiance that it finds over the rays that takes.
 #[derive(Clone, Debug)]
 pub struct ContinuationGrid {
-    corner: Vec3,
-    cells_per_unit: f32,
-    /// By cell and side.
+    cells: OctantGrid<{ LEVELS[2] }>,
+    /// By cell.
     roots: Vec<f32>,
     /// What a ray that finds a radiance of 1 counts as: the factor that is in all roots.
     scale: f32,
@@ -167,27 +164,27 @@ impl ContinuationGrid {
         }
         let bounds = bounds_without_outliers(&records);
         let unoccluded = if pilot.shadow_rays > 0 { pilot.unoccluded as f32 / pilot.shadow_rays as f32 } else { 1.0 };
-        let size = bounds.size().max_element();
         let mut grid = Self {
-            corner: bounds.min,
-            cells_per_unit: if size > 0.0 && size < f32::INFINITY { LEVELS[2] as f32 / size } else { 0.0 },
+            cells: OctantGrid::new(&bounds),
             roots: Vec::new(),
             scale: 1.0,
             shadow_scale: SHADOW_SCALE * unoccluded.sqrt(),
         };
         let mut all = CellSums::default();
-        let mut levels = LEVELS.map(|side| vec![CellSums::default(); side * side * side * SIDES]);
+        let mut levels = LEVELS.map(|side| vec![CellSums::default(); cell_count(side)]);
         for record in &records {
             let radiance = record.radiance.clamp(0.0, MAX_RADIANCE * mean);
             all.add(radiance, record.rays);
-            let cell = grid.cell(record.p, record.n) as usize;
-            for (level, sums) in levels.iter_mut().enumerate() {
-                sums[cell_of_level(cell, level)].add(radiance, record.rays);
+            let cell = grid.cells.cell(record.p, record.n) as usize;
+            for (side, sums) in LEVELS.into_iter().zip(&mut levels) {
+                sums[OctantGrid::<{ LEVELS[2] }>::coarser_cell(cell, side)].add(radiance, record.rays);
             }
         }
         let overall = [all.squared / all.count, all.rays / all.count];
         let root = |cell: usize| {
-            let means = (0..LEVELS.len()).fold(overall, |prior, k| levels[k][cell_of_level(cell, k)].means(prior));
+            let sums = LEVELS.into_iter().zip(&levels);
+            let cell_at = |side: usize| OctantGrid::<{ LEVELS[2] }>::coarser_cell(cell, side);
+            let means = sums.fold(overall, |prior, (side, sums)| sums[cell_at(side)].means(prior));
             (means[0] / means[1].max(1.0)).sqrt() as f32
         };
         grid.roots = (0..levels[2].len()).map(root).collect();
@@ -216,34 +213,14 @@ impl ContinuationGrid {
             *root = self.roots[cell as usize];
         }
     }
-
-    /// The cell and side of a point, nearest to it where the grid has ended.
-    #[inline(always)]
-    fn cell(&self, p: Vec3, n: Vec3) -> u32 {
-        const LAST: f32 = (LEVELS[2] - 1) as f32;
-        // NaN becomes 0.
-        let at = |k: usize| ((p[k] - self.corner[k]) * self.cells_per_unit).clamp(0.0, LAST) as i32;
-        let side = i32::from(n.x < 0.0) | i32::from(n.y < 0.0) << 1 | i32::from(n.z < 0.0) << 2;
-        let side_length = LEVELS[2] as i32;
-        let cell = (at(2) * side_length + at(1)) * side_length + at(0);
-        (cell * SIDES as i32 + side) as u32
-    }
 }
 
 #[inline(always)]
 fn find_cells(grid: &ContinuationGrid, points: &DVec3Rows, normals: &Vec3Rows, cos_side: &Row, cells: &mut Row<u32>) {
     for (i, cell) in cells.iter_mut().enumerate() {
         let n = normals.get(i) * 1f32.copysign(cos_side[i]);
-        *cell = grid.cell(points.get(i).as_vec3(), n);
+        *cell = grid.cells.cell(points.get(i).as_vec3(), n);
     }
-}
-
-/// The cell of a coarser level around a cell of the finest, with the same side.
-fn cell_of_level(cell: usize, level: usize) -> usize {
-    let (side, cell) = (cell % SIDES, cell / SIDES);
-    let (finest, length) = (LEVELS[2], LEVELS[level]);
-    let at = [cell % finest, cell / finest % finest, cell / (finest * finest)].map(|x| x * length / finest);
-    ((at[2] * length + at[1]) * length + at[0]) * SIDES + side
 }
 
 /// The box around all points but a few at its ends.

@@ -1,5 +1,5 @@
-//! Which light vertices are worth connecting to, by place: most are hidden from most of a scene. Vertices are grouped
-//! into clusters, which are chosen by what those of a pilot would add to points near the camera path's vertex,
+//! Importance sampling of light vertices by position: most are hidden from most of a scene. Vertices are grouped into
+//! clusters, which are sampled by what those of a pilot would contribute to points near the camera path's vertex,
 //! visibility included ("Importance Caching for Complex Illumination", Georgiev, Křivánek, Popov and Slusallek 2012,
 //! for single vertices at single points).
 
@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::{LightVertex, bounded, squared};
 use crate::accel::Accelerator;
+use crate::integrator::octant_grid::{OctantGrid, cell_count};
 use crate::math::prefetch::prefetch;
 use crate::math::random::hash64;
 use crate::math::{Aabb, Vec3};
@@ -19,36 +20,33 @@ const LEVELS: u32 = 7;
 /// Clusters of light vertices.
 const CLUSTERS: usize = 1 << LEVELS;
 
-/// Cells along the longest axis of the grid, a multiple of 2.
+/// Cells along the longest axis of the grid of tables, and of the coarser one that gives their prior.
 const GRID_SIDE: usize = 16;
-
-/// Octants of normals.
-const OCTANTS: usize = 8;
+const COARSE_SIDE: usize = 8;
 
 /// The fewest and the most pairs of a point of a cell and a vertex of a cluster that are compared.
 const PAIRS: [u64; 2] = [1, 16];
 
-/// As many pairs as the mean of the eight cells around a cell counts for, beside its own.
+/// Weight of the mean of the coarser cell around a cell, in pairs.
 const PRIOR_PAIRS: f32 = 2.0;
 
-/// The part of the connections for which clusters have equal probabilities.
+/// The part of the connections that are chosen uniformly among all vertices.
 const UNIFORM_FRACTION: f32 = 0.25;
 
-/// What the probabilities of clusters are multiples of one over.
+/// One over the probability of a step: the probabilities of clusters are whole numbers of steps.
 const PROBABILITY_STEPS: u32 = 1 << 16;
 
 /// The sum of the probabilities of the clusters before each, in steps.
 type ClusterCdf = [u16; CLUSTERS];
 
-/// A binary tree over places, in levels; a node has the axis and the coordinate of its split.
+/// A binary tree over positions, in levels; a node has the axis and the coordinate of its split.
 type Splits = Vec<(u8, f32)>;
 
-/// Probabilities of clusters by place and side.
+/// Probabilities of clusters by position and octant of the normal.
 #[derive(Clone, Debug)]
 pub struct ConnectionTables {
     splits: Splits,
-    corner: Vec3,
-    cells_per_unit: f32,
+    grid: OctantGrid<GRID_SIDE>,
     /// By cell, an index into the tables.
     table_indices: Vec<u32>,
     /// The first is that of cells of which nothing is known.
@@ -76,21 +74,18 @@ pub struct ChosenVertex {
 impl ConnectionTables {
     /// From the light vertices of a pilot, with about this many shadow rays.
     pub fn new(pilot: &[LightVertex], accel: &dyn Accelerator, rays: u64) -> Self {
-        let bounds = bounds_of(pilot.iter().map(place));
-        let size = bounds.size().max_element();
         let mut indices: Vec<u32> = (0..pilot.len() as u32).collect();
         let mut splits = vec![(0, f32::INFINITY); CLUSTERS - 1];
         split(pilot, &mut indices, 0, &mut splits);
         let mut tables = Self {
             splits,
-            corner: bounds.min,
-            cells_per_unit: if size > 0.0 && size < f32::INFINITY { GRID_SIDE as f32 / size } else { 0.0 },
-            table_indices: vec![0; GRID_SIDE.pow(3) * OCTANTS],
+            grid: OctantGrid::new(&bounds_of(pilot.iter().map(position))),
+            table_indices: vec![0; cell_count(GRID_SIDE)],
             tables: Vec::new(),
         };
         let clustered = tables.clustered(pilot);
         tables.tables.push(cdf_of([0.0; CLUSTERS], &clustered));
-        let cell = |vertex: &LightVertex| tables.cell(place(vertex), facing_normal(vertex)) as u32;
+        let cell = |vertex: &LightVertex| tables.grid.cell(position(vertex), facing_normal(vertex));
         let mut by_cell: Vec<(u32, u32)> = pilot.iter().map(cell).zip(0..).collect();
         by_cell.sort_unstable();
         let cells: Vec<&[(u32, u32)]> = by_cell.chunk_by(|a, b| a.0 == b.0).collect();
@@ -104,15 +99,15 @@ impl ConnectionTables {
             .enumerate()
             .map(|(i, cell)| is_compared(i).then(|| mean_squares(pilot, &clustered, cell, pairs, accel)))
             .collect();
-        let mut around = vec![([0.0; CLUSTERS], 0.0); (GRID_SIDE / 2).pow(3) * OCTANTS];
+        let mut around = vec![([0.0; CLUSTERS], 0.0); cell_count(COARSE_SIDE)];
         for (cell, squares) in cells.iter().zip(&squares) {
             let Some(squares) = squares else { continue };
-            let (sums, count) = &mut around[parent(cell[0].0 as usize)];
+            let (sums, count) = &mut around[coarse_cell(cell[0].0)];
             sums.iter_mut().zip(squares).for_each(|(sum, square)| *sum += square);
             *count += 1.0;
         }
         for (cell, squares) in cells.iter().zip(&squares) {
-            let (sums, count) = &around[parent(cell[0].0 as usize)];
+            let (sums, count) = &around[coarse_cell(cell[0].0)];
             if *count > 0.0 {
                 let own = |i: usize| squares.as_ref().map_or(0.0, |squares| pairs as f32 * squares[i]);
                 let root = |i: usize| (own(i) + PRIOR_PAIRS * sums[i] / count).sqrt();
@@ -125,7 +120,7 @@ impl ConnectionTables {
 
     /// The vertices by cluster.
     pub fn clustered(&self, vertices: &[LightVertex]) -> ClusteredVertices {
-        let clusters: Vec<u8> = vertices.par_iter().map(|vertex| self.cluster(place(vertex)) as u8).collect();
+        let clusters: Vec<u8> = vertices.par_iter().map(|vertex| self.cluster(position(vertex)) as u8).collect();
         let mut starts = vec![0; CLUSTERS + 1];
         clusters.iter().for_each(|&cluster| starts[usize::from(cluster) + 1] += 1);
         for cluster in 0..CLUSTERS {
@@ -144,7 +139,7 @@ impl ConnectionTables {
     /// The index of the table for a point with this facing normal.
     #[inline]
     pub fn table(&self, p: Vec3, n: Vec3) -> usize {
-        let index = self.table_indices[self.cell(p, n)] as usize;
+        let index = self.table_indices[self.grid.cell(p, n) as usize] as usize;
         prefetch(&self.tables, index);
         index
     }
@@ -168,16 +163,6 @@ impl ConnectionTables {
         Some(ChosenVertex { index, inverse_probability: count as f32 * (PROBABILITY_STEPS as f32 / steps as f32) })
     }
 
-    /// The cell and side of a point, nearest to it where the grid has ended.
-    #[inline(always)]
-    fn cell(&self, p: Vec3, n: Vec3) -> usize {
-        const LAST: f32 = (GRID_SIDE - 1) as f32;
-        // NaN becomes 0.
-        let at = |k: usize| ((p[k] - self.corner[k]) * self.cells_per_unit).clamp(0.0, LAST) as usize;
-        let octant = usize::from(n.x < 0.0) | usize::from(n.y < 0.0) << 1 | usize::from(n.z < 0.0) << 2;
-        ((at(2) * GRID_SIDE + at(1)) * GRID_SIDE + at(0)) * OCTANTS + octant
-    }
-
     #[inline(always)]
     fn cluster(&self, p: Vec3) -> usize {
         let mut node = 0;
@@ -189,7 +174,7 @@ impl ConnectionTables {
     }
 }
 
-fn place(vertex: &LightVertex) -> Vec3 {
+fn position(vertex: &LightVertex) -> Vec3 {
     vertex.point.p.as_vec3()
 }
 
@@ -204,29 +189,26 @@ fn bounds_of(points: impl Iterator<Item = Vec3>) -> Aabb {
 
 /// Splits vertices about in halves along the longest axis, level by level.
 fn split(pilot: &[LightVertex], indices: &mut [u32], node: usize, splits: &mut Splits) {
-    let place = |i: &u32| place(&pilot[*i as usize]);
-    let bounds = bounds_of(indices.iter().map(place));
+    let position = |i: &u32| position(&pilot[*i as usize]);
+    let bounds = bounds_of(indices.iter().map(position));
     let size = bounds.size();
     if node >= splits.len() || !(size.max_element() > 0.0) {
         return;
     }
     let axis = (0..3).max_by(|&a, &b| size[a].total_cmp(&size[b])).unwrap_or(0);
-    indices.sort_unstable_by(|a, b| place(a)[axis].total_cmp(&place(b)[axis]));
-    let at = |i: usize| place(&indices[i])[axis];
+    indices.sort_unstable_by(|a, b| position(a)[axis].total_cmp(&position(b)[axis]));
+    let at = |i: usize| position(&indices[i])[axis];
     // Many have the same coordinate, as on floors: neither side is to be empty.
-    let middle = indices.partition_point(|i| place(i)[axis] < at(indices.len() / 2));
-    let first = if middle > 0 { middle } else { indices.partition_point(|i| place(i)[axis] <= bounds.min[axis]) };
+    let middle = indices.partition_point(|i| position(i)[axis] < at(indices.len() / 2));
+    let first = if middle > 0 { middle } else { indices.partition_point(|i| position(i)[axis] <= bounds.min[axis]) };
     splits[node] = (axis as u8, at(first));
     let (below, above) = indices.split_at_mut(first);
     split(pilot, below, 2 * node + 1, splits);
     split(pilot, above, 2 * node + 2, splits);
 }
 
-/// The cell of twice the size around a cell, with the same octant.
-fn parent(cell: usize) -> usize {
-    let (octant, cell) = (cell % OCTANTS, cell / OCTANTS);
-    let [x, y, z] = [cell % GRID_SIDE, cell / GRID_SIDE % GRID_SIDE, cell / GRID_SIDE.pow(2)].map(|at| at / 2);
-    ((z * GRID_SIDE / 2 + y) * GRID_SIDE / 2 + x) * OCTANTS + octant
+fn coarse_cell(cell: u32) -> usize {
+    OctantGrid::<GRID_SIDE>::coarser_cell(cell as usize, COARSE_SIDE)
 }
 
 /// The mean squares of what the vertices of each cluster add to points of a cell, both by index.
@@ -359,7 +341,7 @@ mod tests {
             let (mut seen, mut weights, mut chosen) = (0, 0.0, vec![false; vertices.len()]);
             for i in 0..CHOICES {
                 let u = (f64::from(i) + 0.5) / f64::from(CHOICES);
-                let choice = tables.choose(tables.table(place(at), facing_normal(at)), &clustered, u).unwrap();
+                let choice = tables.choose(tables.table(position(at), facing_normal(at)), &clustered, u).unwrap();
                 let light = &vertices[choice.index];
                 seen += u32::from(contribution(at, light, &Wall) > 0.0);
                 weights += f64::from(choice.inverse_probability);
@@ -373,7 +355,7 @@ mod tests {
     }
 
     #[test]
-    fn points_apart_from_the_pilot_and_odd_pilots_have_choices() {
+    fn points_far_from_the_pilot_and_pilots_of_one_vertex_have_choices() {
         let vertices = rooms(true);
         let one = ConnectionTables::new(&vertices[..1], &Wall, 100);
         let clustered = one.clustered(&vertices);

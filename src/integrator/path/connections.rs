@@ -108,15 +108,15 @@ fn choose<'a>(context: &Context, wave: &mut Wave, light_paths: &LightPaths<'a>) 
     let LightPaths { vertices: all, tables, clustered, .. } = *light_paths;
     let Wave { vertices, connection_ends: ends, connection_mis: ConnectionMis { mis, .. }, .. } = wave;
     let mut indices = [0; BATCH];
-    let mut of_lanes = [0; BATCH];
-    for (lane, table) in of_lanes.iter_mut().enumerate().take(vertices.count) {
+    let mut table_indices = [0; BATCH];
+    for (lane, table) in table_indices.iter_mut().enumerate().take(vertices.count) {
         *table = tables.table(vertices.points.p.get(lane).as_vec3(), vertices.facing_normal(lane));
     }
     for (lane, index) in indices.iter_mut().enumerate().take(vertices.count) {
         let [u, digits, ..] = vertices.u_light.of(lane);
         // Random numbers are multiples of 2^-24.
         let u = f64::from(u) + f64::from(digits) * (1.0 / 16_777_216.0);
-        let choice = tables.choose(of_lanes[lane], clustered, u);
+        let choice = tables.choose(table_indices[lane], clustered, u);
         // In an empty cluster there is nothing to connect to.
         let ChosenVertex { index: chosen, inverse_probability } =
             choice.unwrap_or(ChosenVertex { index: 0, inverse_probability: 0.0 });

@@ -265,9 +265,9 @@ pub struct RenderArgs {
     /// Russian roulette: auto, throughput, shadow_rays or off
     ///
     /// auto: paths and shadow rays by expected contribution to the pixel and cost, both estimated from a pilot of 1/8
-    /// sample per pixel; shadow_rays: only these; throughput: paths by throughput, from depth 5 or a smaller rr_depth
-    /// of the scene; off: none. All are unbiased. Default: the scene's setting; without one, auto; if the scene has
-    /// rr_depth, throughput, or shadow_rays if rr_depth reaches a max_depth above 6
+    /// sample per pixel; shadow_rays: shadow rays alone, by the same estimates; throughput: paths by throughput, from
+    /// depth 5 or a smaller rr_depth of the scene; off: none. All are unbiased. Default: the scene's setting; without
+    /// one, auto; with rr_depth, throughput, or shadow_rays if rr_depth >= max_depth - 1 and max_depth > 6
     #[arg(long, value_name = "NAME", value_parser = names::plain::<RouletteDesc>(), help_heading = "Algorithm")]
     pub roulette: Option<RouletteDesc>,
     /// Clamp the contribution of a single path of indirect light: less noise, but biased (too dark). Off by default;

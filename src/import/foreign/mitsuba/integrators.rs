@@ -9,7 +9,7 @@ use crate::error::Result;
 /// The depth for paths of any length.
 const UNLIMITED: u32 = 65_536;
 
-/// What files mean that do not give it: a file that gives it asks for nothing else.
+/// Mitsuba's default: a file that states it is read like one without it.
 const DEFAULT_RR_DEPTH: u32 = 5;
 
 /// What a scene without an integrator is rendered with.
