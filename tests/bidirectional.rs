@@ -97,6 +97,40 @@ fn glossy() -> Value {
     )
 }
 
+/// A room that sun and sky light by a window of two halves, one of them glazed, with a mirror.
+fn window() -> Value {
+    let quad = |material: &str, origin: [f64; 3], u: [f64; 3], v: [f64; 3]| json!({ "type": "quad", "material": material, "origin": origin, "edge_u": u, "edge_v": v });
+    json!({
+        "camera": { "position": [1.2, 1.6, 3.5], "look_at": [-0.5, 1, 0], "vertical_fov_degrees": 50 },
+        "film": { "width": 72, "height": 72, "filter": { "type": "box" } },
+        "integrator": { "type": "path", "max_depth": 6, "rr_depth": 5 },
+        "materials": {
+            "white": { "type": "diffuse", "albedo": 0.7 }, "mirror": { "type": "mirror" },
+            "glass": { "type": "thin_dielectric" }, "car": { "type": "plastic", "albedo": [0.6, 0.3, 0.2] }
+        },
+        "lights": [
+            { "type": "environment", "radiance": [1, 1.2, 1.6] },
+            { "type": "directional", "direction": [1, -0.5, -0.2], "irradiance": [9, 8, 6] },
+            { "type": "directional", "direction": [1, -1, 0.3], "irradiance": [3, 2, 2],
+              "angular_diameter_degrees": 20 }
+        ],
+        "shapes": [
+            quad("white", [-2.0, 0.0, 4.0], [4.0, 0.0, 0.0], [0.0, 0.0, -6.0]),
+            quad("white", [-2.0, 3.0, 4.0], [4.0, 0.0, 0.0], [0.0, 0.0, -6.0]),
+            quad("white", [-2.0, 0.0, -2.0], [4.0, 0.0, 0.0], [0.0, 3.0, 0.0]),
+            quad("white", [-2.0, 0.0, 4.0], [4.0, 0.0, 0.0], [0.0, 3.0, 0.0]),
+            quad("white", [2.0, 0.0, -2.0], [0.0, 0.0, 6.0], [0.0, 3.0, 0.0]),
+            quad("white", [-2.0, 0.0, -2.0], [0.0, 0.0, 6.0], [0.0, 1.0, 0.0]),
+            quad("white", [-2.0, 2.0, -2.0], [0.0, 0.0, 6.0], [0.0, 1.0, 0.0]),
+            quad("white", [-2.0, 1.0, -2.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]),
+            quad("white", [-2.0, 1.0, 0.5], [0.0, 0.0, 3.5], [0.0, 1.0, 0.0]),
+            quad("glass", [-2.0, 1.0, -1.0], [0.0, 0.0, 0.7], [0.0, 1.0, 0.0]),
+            quad("mirror", [-0.5, 1.0, -1.9], [1.0, 0.0, 0.2], [0.0, 1.0, 0.0]),
+            { "type": "sphere", "material": "car", "radius": 0.5, "transform": [{ "translate": [-0.5, 0.5, 0.3] }] }
+        ]
+    })
+}
+
 fn of(scene: &Value, bidirectional: impl Into<AutoDesc>, overrides: &Overrides) -> Image {
     let overrides = Overrides { bidirectional: Some(bidirectional.into()), ..overrides.clone() };
     render_with(&prepare(scene, &overrides), AccelKind::EMBREE).image
@@ -109,8 +143,13 @@ fn of_seed(scene: &Value, bidirectional: impl Into<AutoDesc>, seed: u64, spp: u3
 /// By Welch's test on blocks of pixels: a wrong density or weight of any strategy would be seen.
 #[test]
 fn light_paths_and_paths_have_the_same_mean() {
-    let scenes =
-        [("plain", plain()), ("hidden lamp", hidden_lamp()), ("smooth facets", smooth_facets()), ("glossy", glossy())];
+    let scenes = [
+        ("plain", plain()),
+        ("hidden lamp", hidden_lamp()),
+        ("smooth facets", smooth_facets()),
+        ("glossy", glossy()),
+        ("window", window()),
+    ];
     for (what, scene) in scenes {
         let blocks = |bidirectional, first: u64, spp| -> Vec<Vec<f64>> {
             (first..first + 8).map(|seed| block_means(&of_seed(&scene, bidirectional, seed, spp))).collect()

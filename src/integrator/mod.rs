@@ -26,7 +26,9 @@ mod vertex;
 mod whitted;
 mod world;
 
-pub use bidirectional::{ClusteredVertices, ConnectionTables, Emitters, LightPaths, LightVertex};
+pub use bidirectional::{
+    ClusteredVertices, ConnectionPilot, ConnectionTables, DistantRay, Emitters, LightPaths, LightVertex,
+};
 pub use cancel::Cancel;
 pub use caustics::{CausticCasters, CausticPoint, Caustics, EPOCH, Photon, PhotonMap};
 pub use debug::{AmbientOcclusion, DebugView, View};

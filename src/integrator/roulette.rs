@@ -2,7 +2,8 @@
 //! without splitting): a path goes on with a probability in proportion to what it may still add to the error of its
 //! pixel, over the root of what going on costs.
 
-use super::octant_grid::{OctantGrid, cell_count};
+use super::bidirectional::DistantRay;
+use super::octant_grid::{OctantGrid, bounds_without_outliers, cell_count};
 use crate::desc::DEFAULT_RR_DEPTH;
 use crate::math::rows::{BATCH, DVec3Rows, Row, Vec3Rows};
 use crate::math::vectorize::vectorize;
@@ -93,6 +94,12 @@ pub struct PilotRecords {
     /// What a sample's first vertex got from the first light less what it got from the second, each with half its
     /// weight; by sample, the largest channel.
     pub light_differences: Vec<f32>,
+    /// Rays of lights at infinity.
+    pub distant_rays: Vec<DistantRay>,
+    /// What these add to the samples, by the largest channel.
+    pub distant_contribution: f32,
+    /// What shadow rays towards other lights add.
+    pub near_contribution: f32,
 }
 
 impl PilotRecords {
@@ -103,6 +110,20 @@ impl PilotRecords {
         self.unoccluded += other.unoccluded;
         self.further_shadow_rays += other.further_shadow_rays;
         self.light_differences.append(&mut other.light_differences);
+        self.distant_rays.append(&mut other.distant_rays);
+        self.distant_contribution += other.distant_contribution;
+        self.near_contribution += other.near_contribution;
+    }
+
+    /// Of all scatterings, as far as they are finite.
+    fn finite_continuations(&self) -> Vec<Continuation> {
+        let finite = |record: &&Continuation| record.p.is_finite() && record.radiance.is_finite();
+        self.continuations.iter().filter(finite).copied().collect()
+    }
+
+    /// The box around all points where paths were scattered but a few at its ends.
+    pub fn bounds(&self) -> Aabb {
+        bounds_without_outliers(&positions(&self.finite_continuations()))
     }
 }
 
@@ -114,9 +135,6 @@ const PRIOR_RECORDS: f64 = 8.0;
 
 /// A record counts with this many times the mean radiance at most.
 const MAX_RADIANCE: f32 = 20.0;
-
-/// Records at either end of an axis that may lie outside of the grid, of all.
-const OUTLIERS: f64 = 0.005;
 
 /// By where a path is scattered, the root of the mean squared radiance that it finds over the rays that takes.
 #[derive(Clone, Debug)]
@@ -156,13 +174,12 @@ impl CellSums {
 impl ContinuationGrid {
     /// From what pilot paths found; `None` if they found no light.
     pub fn new(pilot: &PilotRecords) -> Option<Self> {
-        let finite = |record: &&Continuation| record.p.is_finite() && record.radiance.is_finite();
-        let records: Vec<Continuation> = pilot.continuations.iter().filter(finite).copied().collect();
+        let records = pilot.finite_continuations();
         let mean = (records.iter().map(|record| f64::from(record.radiance)).sum::<f64>() / records.len() as f64) as f32;
         if !(mean > 0.0 && mean < f32::INFINITY) {
             return None;
         }
-        let bounds = bounds_without_outliers(&records);
+        let bounds = bounds_without_outliers(&positions(&records));
         let unoccluded = if pilot.shadow_rays > 0 { pilot.unoccluded as f32 / pilot.shadow_rays as f32 } else { 1.0 };
         let mut grid = Self {
             cells: OctantGrid::new(&bounds),
@@ -223,17 +240,8 @@ fn find_cells(grid: &ContinuationGrid, points: &DVec3Rows, normals: &Vec3Rows, c
     }
 }
 
-/// The box around all points but a few at its ends.
-fn bounds_without_outliers(records: &[Continuation]) -> Aabb {
-    let mut bounds = Aabb::EMPTY;
-    let outliers = (records.len() as f64 * OUTLIERS) as usize;
-    for k in 0..3 {
-        let mut coordinates: Vec<f32> = records.iter().map(|record| record.p[k]).collect();
-        coordinates.sort_unstable_by(f32::total_cmp);
-        bounds.min[k] = coordinates[outliers];
-        bounds.max[k] = coordinates[coordinates.len() - 1 - outliers];
-    }
-    bounds
+fn positions(records: &[Continuation]) -> Vec<Vec3> {
+    records.iter().map(|record| record.p).collect()
 }
 
 #[cfg(test)]

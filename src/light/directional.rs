@@ -51,6 +51,16 @@ impl DirectionalLight {
         self.disk.is_none()
     }
 
+    /// Unit direction to the light, or to the middle of its cone.
+    pub fn axis(&self) -> Vec3 {
+        self.frame.z
+    }
+
+    /// Irradiance on a surface that faces it.
+    pub fn irradiance(&self) -> Rgb {
+        self.irradiance
+    }
+
     /// Light from a chosen direction, `u` in the unit square.
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> Option<LightSample> {

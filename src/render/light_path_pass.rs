@@ -1,14 +1,15 @@
 //! Light paths: one set for each epoch of samples.
 
 use std::ops::RangeInclusive;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use super::epoch::trace_parts;
 use super::tile_renderer::TileWorkspace;
 use super::{LightTracing, Settings};
+use crate::geometry::SpawnPoint;
 use crate::integrator::{
-    ClusteredVertices, ConnectionTables, EPOCH, Emitters, Integrator, LightPaths, LightVertex, PassContext,
-    PhotonRange, RayCounts,
+    ClusteredVertices, ConnectionPilot, ConnectionTables, EPOCH, Emitters, Integrator, LightPaths, LightVertex,
+    PassContext, PhotonRange, PilotRecords, RayCounts,
 };
 use crate::sampling::{PixelSeed, Sampler};
 use crate::scene::Scene;
@@ -19,25 +20,33 @@ const PATHS_PER_PIXEL: f64 = 0.5;
 /// The fewest and the most light paths traced in an epoch; the most take 200 MB.
 const PATHS: RangeInclusive<f64> = 16_384.0..=250_000.0;
 
-/// Shadow rays for the tables by which vertices are chosen, by pixel of the picture: for the picture, and for the pilot
-/// that decides whether paths are connected.
-const TABLE_RAYS_PER_PIXEL: u64 = 8;
-const PILOT_TABLE_RAYS_PER_PIXEL: u64 = 1;
+/// Shadow rays for the tables by which vertices are chosen, by pixel of the picture: for the pilot that decides whether
+/// paths are connected, for the first epochs of the picture, and for those from [`LATER`] on.
+const TABLE_RAYS_PER_PIXEL: [u64; 3] = [1, 8, 24];
+
+/// From this epoch on there are so many samples that better tables pay.
+const LATER: u32 = 2;
+
+/// The most points of paths from the camera that tables are made for.
+const MAX_POINTS: usize = 1 << 17;
 
 /// The epoch of the light paths that the tables are made from, beyond those of samples.
 const TABLE_EPOCH: u32 = u32::MAX;
 
 /// Traces light paths and keeps those of one epoch.
 pub(super) struct LightPathPass {
-    emitters: Emitters,
+    /// Where they start, once that is known.
+    emitters: Option<Emitters>,
+    /// Points where paths from the camera were scattered, with their facing normals.
+    points: Arc<[SpawnPoint]>,
     /// Whether they are those of the pilot.
     is_pilot: bool,
     /// Light paths of an epoch.
     traced: u32,
-    /// Shadow rays for the tables.
-    table_rays: u64,
-    /// By which vertices are chosen; made with the first epoch.
-    tables: Option<ConnectionTables>,
+    /// Pixels of the picture.
+    pixels: u64,
+    /// By which vertices are chosen, with the index of their number of rays.
+    tables: Option<(usize, ConnectionTables)>,
     /// The epoch, and the vertices of its paths.
     vertices: Option<(u32, Vec<LightVertex>, ClusteredVertices)>,
 }
@@ -60,18 +69,31 @@ impl LightPathPass {
             }
             return None;
         }
-        let emitters = Emitters::new(scene)?;
+        if !Emitters::may_start(scene) {
+            return None;
+        }
         let [width, height] = settings.size.map(f64::from);
         let traced = (PATHS_PER_PIXEL * width * height).clamp(*PATHS.start(), *PATHS.end()) as u32;
-        let table_rays = TABLE_RAYS_PER_PIXEL * (width * height) as u64;
-        Some(Self { emitters, is_pilot: false, traced, table_rays, tables: None, vertices: None })
+        let pixels = (width * height) as u64;
+        let points = Arc::default();
+        Some(Self { emitters: None, points, is_pilot: false, traced, pixels, tables: None, vertices: None })
     }
 
     /// As many light paths as a pilot needs.
     pub fn for_pilot(&self) -> Self {
-        let (emitters, traced) = (self.emitters.clone(), self.pilot_paths());
-        let table_rays = self.table_rays / TABLE_RAYS_PER_PIXEL * PILOT_TABLE_RAYS_PER_PIXEL;
-        Self { emitters, is_pilot: true, traced, table_rays, tables: None, vertices: None }
+        let (emitters, points, traced) = (self.emitters.clone(), self.points.clone(), self.pilot_paths());
+        Self { emitters, points, is_pilot: true, traced, pixels: self.pixels, tables: None, vertices: None }
+    }
+
+    /// With what a pilot of paths from the camera has found; `None` if no light path can start.
+    pub fn with_pilot(self, scene: &Scene, pilot: &PilotRecords) -> Option<Self> {
+        let step = pilot.continuations.len().div_ceil(MAX_POINTS).max(1);
+        let points = pilot.continuations.iter().step_by(step).filter(|record| record.p.is_finite()).map(|record| {
+            // The point was rounded.
+            let error = f32::EPSILON * record.p.abs().max_element();
+            SpawnPoint { p: record.p.as_dvec3(), n: record.n, error }
+        });
+        Some(Self { emitters: Some(Emitters::new(scene, pilot)?), points: points.collect(), ..self })
     }
 
     /// Light paths of an epoch over those of the pilot.
@@ -86,8 +108,8 @@ impl LightPathPass {
     /// What paths are connected to, if there is anything.
     pub fn light_paths(&self) -> Option<LightPaths<'_>> {
         let (_, vertices, clustered) = self.vertices.as_ref().filter(|(_, vertices, _)| !vertices.is_empty())?;
-        let tables = self.tables.as_ref()?;
-        let (emitters, traced) = (&self.emitters, self.traced);
+        let (_, tables) = self.tables.as_ref()?;
+        let (emitters, traced) = (self.emitters.as_ref()?, self.traced);
         Some(LightPaths { emitters, vertices, tables, clustered, traced, has_moments: self.is_pilot })
     }
 
@@ -104,21 +126,28 @@ impl LightPathPass {
         if self.vertices.as_ref().is_some_and(|(known, ..)| *known == epoch) {
             return RayCounts::default();
         }
+        let Some(emitters) = &self.emitters else { return RayCounts::default() };
         let pilot_paths = self.pilot_paths();
         let trace = |epoch: u32, count: u32| {
             // Beyond all pixels, and beside the photons' seeds.
             let seed: PixelSeed = sampler.pixel(epoch, u32::MAX - 1);
             trace_parts(count, workspaces, |indices, workspace, vertices| {
-                integrator.trace_light_paths(pass, &self.emitters, &PhotonRange { seed, indices }, workspace, vertices);
+                integrator.trace_light_paths(pass, emitters, &PhotonRange { seed, indices }, workspace, vertices);
             })
         };
-        let tables = self.tables.get_or_insert_with(|| {
-            let (pilot, _) = trace(TABLE_EPOCH, pilot_paths);
-            ConnectionTables::new(&pilot, pass.world.accel, self.table_rays)
-        });
+        let stage = if self.is_pilot { 0 } else { 1 + usize::from(epoch >= LATER) };
+        let tables = match self.tables.take().filter(|(known, _)| *known == stage) {
+            Some((_, tables)) => tables,
+            None => {
+                let (vertices, _) = trace(TABLE_EPOCH, pilot_paths);
+                let pilot = ConnectionPilot { vertices: &vertices, paths: pilot_paths, points: &self.points };
+                let rays = TABLE_RAYS_PER_PIXEL[stage] * self.pixels;
+                ConnectionTables::new(&pilot, pass.world.accel, rays)
+            }
+        };
         let (vertices, counts) = trace(epoch, self.traced);
         let clustered = tables.clustered(&vertices);
-        self.vertices = Some((epoch, vertices, clustered));
+        (self.tables, self.vertices) = (Some((stage, tables)), Some((epoch, vertices, clustered)));
         counts
     }
 }

@@ -22,6 +22,7 @@ const LEAST_DIFFERENCE: f64 = 0.05;
 const RAY_COST: f64 = 1.25;
 
 /// How a lower bound of a gain is estimated.
+#[derive(Clone, Copy)]
 struct GainBound {
     /// The part of the pixels, those where a method gains most, that is left out: what rare bright samples seem to gain
     /// is less certain than the deviation shows.
@@ -32,6 +33,13 @@ struct GainBound {
 
 /// For whether a method is worth its time: caustics often cover one pixel of a hundred.
 const WORTHWHILE: GainBound = GainBound { left_out: 0.002, deviations: 1.0 };
+
+/// For connections: light of lamps and windows is in all of a picture.
+const WIDESPREAD: GainBound = GainBound { left_out: 0.05, deviations: 1.0 };
+
+/// Connections are worth their time where they gain this many times more by [`WIDESPREAD`]: more samples of a pixel are
+/// better spread, by which paths without connections gain more.
+const LEAST_EFFICIENCY: f64 = 1.5;
 
 /// For which of two methods that are is better.
 const COMPARISON: GainBound = GainBound { left_out: 0.05, deviations: 2.0 };
@@ -54,7 +62,7 @@ pub(super) fn choose(renderer: &mut TileRenderer, workspaces: &[Mutex<TileWorksp
     let (mut choice, mut best) = (LightTracing::Off, None);
     if let Some(light_paths) = &light_paths {
         pilot.renderer.light_paths = Some(light_paths.for_pilot());
-        let efficiency = pilot.efficiency(light_paths.per_pilot_path());
+        let efficiency = pilot.efficiency(light_paths.per_pilot_path(), Some(WIDESPREAD));
         if efficiency > best {
             (choice, best) = (LightTracing::Bidirectional, efficiency);
         }
@@ -63,7 +71,7 @@ pub(super) fn choose(renderer: &mut TileRenderer, workspaces: &[Mutex<TileWorksp
     if let Some(caustics) = caustics {
         let per_pilot_photon = caustics.per_pilot_photon();
         pilot.renderer.caustics = Some(caustics.for_pilot(true));
-        if pilot.efficiency(per_pilot_photon) > best {
+        if pilot.efficiency(per_pilot_photon, None) > best {
             choice = LightTracing::Photons;
         }
         renderer.caustics = renderer.caustics.take().map(|caustics| caustics.for_pilot(false));
@@ -74,15 +82,17 @@ pub(super) fn choose(renderer: &mut TileRenderer, workspaces: &[Mutex<TileWorksp
 
 impl Pilot<'_, '_> {
     /// Inverse variance for the time over that of unidirectional paths, at least, with what the renderer has; `None`
-    /// where that is not worth its time. Of rays from lights, the picture has `light_ray_factor` times as many.
-    fn efficiency(&mut self, light_ray_factor: f64) -> Option<f64> {
+    /// where that is not worth its time, also by the bound of a method whose light is widespread. Of rays from lights,
+    /// the picture has `light_ray_factor` times as many.
+    fn efficiency(&mut self, light_ray_factor: f64, widespread: Option<GainBound>) -> Option<f64> {
         let light_rays = self.renderer.trace_from_lights(FIRST_SAMPLE, self.workspaces).total() as f64;
         let samples = trace(self.renderer, SAMPLES, self.workspaces);
         // They are shared by all samples of an epoch.
         let shared_by = f64::from(EPOCH) * self.renderer.whole_view().area() as f64;
         let light_rays = light_rays * light_ray_factor / shared_by;
         let cost = RAY_COST * (samples.rays() + light_rays) / self.unidirectional.rays();
-        tracing::info!("pilot of light tracing: {:?} for {cost:.2} of the time", samples.gain(WORTHWHILE.left_out));
+        let gains = [WORTHWHILE, COMPARISON].map(|bound| samples.gain(bound.left_out));
+        tracing::info!("pilot of light tracing: {gains:?} for {cost:.2} of the time");
         // Where paths find all light and have hardly any noise, what they add from vertex to vertex cancels out.
         let have_noise = self.unidirectional.relative_variance() > LEAST_NOISE;
         let miss_light = (self.unidirectional.mean() / samples.mean() - 1.0).abs() > LEAST_DIFFERENCE;
@@ -93,6 +103,9 @@ impl Pilot<'_, '_> {
             samples.gain(left_out).map(|gain| (gain.value - deviations * gain.deviation) / cost)
         };
         at_least(WORTHWHILE).filter(|&efficiency| efficiency > 1.0)?;
+        if let Some(bound) = widespread {
+            at_least(bound).filter(|&efficiency| efficiency > LEAST_EFFICIENCY)?;
+        }
         at_least(COMPARISON)
     }
 }

@@ -172,14 +172,15 @@ struct PilotSamples {
     counts: RayCounts,
 }
 
-impl RouletteEstimates {
-    /// Traces the pilot of a picture; `None` if it is black.
-    /// Without `light_samples` it finds how many are best.
-    pub fn new(
-        renderer: &TileRenderer,
-        workspaces: &[Mutex<TileWorkspace>],
-        light_samples: Option<u32>,
-    ) -> Option<Self> {
+/// Pilot samples from all over the picture.
+pub(super) struct CameraPilot {
+    grid: PilotGrid,
+    samples: PilotSamples,
+}
+
+impl CameraPilot {
+    /// Traces the pilot of a picture.
+    pub fn trace(renderer: &TileRenderer, workspaces: &[Mutex<TileWorkspace>]) -> Self {
         let grid = PilotGrid::new(renderer.view);
         let chunk = TILE_SIZE * TILE_SIZE / (2 * GROUP);
         let parts: Vec<PilotSamples> = (0..grid.count().div_ceil(chunk))
@@ -197,7 +198,19 @@ impl RouletteEstimates {
             all.records.append(&mut part.records);
             all.counts.add(&part.counts);
         }
-        Self::from_samples(grid, &all, light_samples)
+        Self { grid, samples: all }
+    }
+
+    /// What its paths found.
+    pub fn records(&self) -> &PilotRecords {
+        &self.samples.records
+    }
+}
+
+impl RouletteEstimates {
+    /// By the pilot of a picture; `None` if it is black. Without `light_samples` it finds how many are best.
+    pub fn new(pilot: &CameraPilot, light_samples: Option<u32>) -> Option<Self> {
+        Self::from_samples(pilot.grid, &pilot.samples, light_samples)
     }
 
     fn from_samples(grid: PilotGrid, samples: &PilotSamples, light_samples: Option<u32>) -> Option<Self> {

@@ -7,7 +7,7 @@ use super::caustic_pass::CausticPass;
 use super::light_path_pass::LightPathPass;
 use super::light_tracing_pilot;
 use super::pixel_order::{pixel_of_slot, slots};
-use super::roulette_pass::RouletteEstimates;
+use super::roulette_pass::{CameraPilot, RouletteEstimates};
 use super::{FINEST_SPP, LightTracing, Settings, TILE_SIZE, film_shape};
 use crate::accel::Accelerator;
 use crate::desc::{IntegratorDesc, RouletteDesc};
@@ -163,10 +163,17 @@ impl<'a> TileRenderer<'a> {
     /// Traces the pilots of the picture, as far as they are needed: that of roulette, and that of photons and light
     /// paths unless what it found is known.
     pub fn prepare(&mut self, workspaces: &[Mutex<TileWorkspace>], known: Option<LightTracing>) {
-        if self.needs_pilot {
-            self.roulette = RouletteEstimates::new(self, workspaces, self.light_samples);
+        let known = self.light_tracing.or(known);
+        self.light_paths.take_if(|_| known.is_some_and(|known| known != LightTracing::Bidirectional));
+        if self.needs_pilot || self.light_paths.is_some() {
+            let pilot = CameraPilot::trace(self, workspaces);
+            if self.needs_pilot {
+                self.roulette = RouletteEstimates::new(&pilot, self.light_samples);
+            }
+            let light_paths = self.light_paths.take();
+            self.light_paths = light_paths.and_then(|pass| pass.with_pilot(self.world.scene, pilot.records()));
         }
-        let choice = self.light_tracing.or(known).unwrap_or_else(|| light_tracing_pilot::choose(self, workspaces));
+        let choice = known.unwrap_or_else(|| light_tracing_pilot::choose(self, workspaces));
         self.caustics.take_if(|_| choice != LightTracing::Photons);
         self.light_paths.take_if(|_| choice != LightTracing::Bidirectional);
     }

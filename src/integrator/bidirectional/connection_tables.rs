@@ -8,11 +8,13 @@ use std::f32::consts::FRAC_1_PI;
 use rayon::prelude::*;
 
 use super::{LightVertex, bounded, squared};
-use crate::accel::Accelerator;
-use crate::integrator::octant_grid::{OctantGrid, cell_count};
+use crate::accel::{Accelerator, Coherence};
+use crate::geometry::SpawnPoint;
+use crate::integrator::octant_grid::{OctantGrid, bounds_without_outliers, cell_count};
 use crate::math::prefetch::prefetch;
 use crate::math::random::hash64;
-use crate::math::{Aabb, Vec3};
+use crate::math::rows::BATCH;
+use crate::math::{Aabb, RayRows, Vec3};
 
 /// Levels of the tree of clusters.
 const LEVELS: u32 = 7;
@@ -25,7 +27,10 @@ const GRID_SIDE: usize = 16;
 const COARSE_SIDE: usize = 8;
 
 /// The fewest and the most pairs of a point of a cell and a vertex of a cluster that are compared.
-const PAIRS: [u64; 2] = [1, 16];
+const PAIRS: [u64; 2] = [1, 32];
+
+/// Vertices that would contribute less than this part of the most are taken to be visible as often as others.
+const LEAST_TRACED: f32 = 0.05;
 
 /// Weight of the mean of the coarser cell around a cell, in pairs.
 const PRIOR_PAIRS: f32 = 2.0;
@@ -51,6 +56,8 @@ pub struct ConnectionTables {
     table_indices: Vec<u32>,
     /// The first is that of cells of which nothing is known.
     tables: Vec<ClusterCdf>,
+    /// By table, the radiance that a connection of a diffuse point with an albedo of 1 is expected to add.
+    radiances: Vec<f32>,
 }
 
 /// Light vertices by cluster.
@@ -62,6 +69,17 @@ pub struct ClusteredVertices {
     starts: Vec<u32>,
 }
 
+/// What tables are made from.
+#[derive(Clone, Copy, Debug)]
+pub struct ConnectionPilot<'a> {
+    /// The vertices of light paths.
+    pub vertices: &'a [LightVertex],
+    /// The number of these paths.
+    pub paths: u32,
+    /// Where paths from the camera were scattered, with the normals on their side.
+    pub points: &'a [SpawnPoint],
+}
+
 /// A light vertex that was chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChosenVertex {
@@ -71,22 +89,33 @@ pub struct ChosenVertex {
     pub inverse_probability: f32,
 }
 
+impl ClusteredVertices {
+    /// Those of a cluster.
+    fn of(&self, cluster: usize) -> &[u32] {
+        &self.order[self.starts[cluster] as usize..self.starts[cluster + 1] as usize]
+    }
+}
+
 impl ConnectionTables {
-    /// From the light vertices of a pilot, with about this many shadow rays.
-    pub fn new(pilot: &[LightVertex], accel: &dyn Accelerator, rays: u64) -> Self {
-        let mut indices: Vec<u32> = (0..pilot.len() as u32).collect();
+    /// From a pilot, with about this many shadow rays.
+    pub fn new(pilot: &ConnectionPilot, accel: &dyn Accelerator, rays: u64) -> Self {
+        let ConnectionPilot { vertices, points, paths } = *pilot;
+        let mut indices: Vec<u32> = (0..vertices.len() as u32).collect();
         let mut splits = vec![(0, f32::INFINITY); CLUSTERS - 1];
-        split(pilot, &mut indices, 0, &mut splits);
+        split(vertices, &mut indices, 0, &mut splits);
+        let positions: Vec<Vec3> = points.iter().map(|point| point.p.as_vec3()).collect();
         let mut tables = Self {
             splits,
-            grid: OctantGrid::new(&bounds_of(pilot.iter().map(position))),
+            grid: OctantGrid::new(&bounds_without_outliers(&positions)),
             table_indices: vec![0; cell_count(GRID_SIDE)],
             tables: Vec::new(),
+            radiances: Vec::new(),
         };
-        let clustered = tables.clustered(pilot);
+        let clustered = tables.clustered(vertices);
         tables.tables.push(cdf_of([0.0; CLUSTERS], &clustered));
-        let cell = |vertex: &LightVertex| tables.grid.cell(position(vertex), facing_normal(vertex));
-        let mut by_cell: Vec<(u32, u32)> = pilot.iter().map(cell).zip(0..).collect();
+        tables.radiances.push(f32::INFINITY);
+        let cell = |point: &SpawnPoint| tables.grid.cell(point.p.as_vec3(), point.n);
+        let mut by_cell: Vec<(u32, u32)> = points.iter().map(cell).zip(0..).collect();
         by_cell.sort_unstable();
         let cells: Vec<&[(u32, u32)]> = by_cell.chunk_by(|a, b| a.0 == b.0).collect();
         // With fewer rays than cells and clusters, some cells take the mean of those around them.
@@ -112,7 +141,11 @@ impl ConnectionTables {
                 let own = |i: usize| squares.as_ref().map_or(0.0, |squares| pairs as f32 * squares[i]);
                 let root = |i: usize| (own(i) + PRIOR_PAIRS * sums[i] / count).sqrt();
                 tables.table_indices[cell[0].0 as usize] = tables.tables.len() as u32;
-                tables.tables.push(cdf_of(std::array::from_fn(root), &clustered));
+                let roots = std::array::from_fn(root);
+                tables.tables.push(cdf_of(roots, &clustered));
+                let sum: f32 = (0..CLUSTERS).map(|i| roots[i] * clustered.of(i).len() as f32).sum();
+                let pairs = if squares.is_some() { pairs as f32 } else { 0.0 } + PRIOR_PAIRS;
+                tables.radiances.push(FRAC_1_PI * FRAC_1_PI * sum / (pairs.sqrt() * paths as f32));
             }
         }
         tables
@@ -139,9 +172,20 @@ impl ConnectionTables {
     /// The index of the table for a point with this facing normal.
     #[inline]
     pub fn table(&self, p: Vec3, n: Vec3) -> usize {
-        let index = self.table_indices[self.grid.cell(p, n) as usize] as usize;
-        prefetch(&self.tables, index);
-        index
+        self.table_indices[self.grid.cell(p, n) as usize] as usize
+    }
+
+    /// Makes a table ready for [`choose`](Self::choose).
+    #[inline]
+    pub fn prefetch(&self, table: usize) {
+        prefetch(&self.tables, table);
+    }
+
+    /// The radiance that a connection of a diffuse point of a table with an albedo of 1 is expected to add; infinite
+    /// where nothing is known.
+    #[inline]
+    pub fn radiance(&self, table: usize) -> f32 {
+        self.radiances[table]
     }
 
     /// A vertex to connect a point of a table to, by a number in `[0, 1)`; `None` if the chosen cluster is empty.
@@ -213,7 +257,7 @@ fn coarse_cell(cell: u32) -> usize {
 
 /// The mean squares of what the vertices of each cluster add to points of a cell, both by index.
 fn mean_squares(
-    pilot: &[LightVertex],
+    pilot: &ConnectionPilot,
     clustered: &ClusteredVertices,
     cell: &[(u32, u32)],
     pairs: u32,
@@ -225,26 +269,46 @@ fn mean_squares(
         ((hash64(counter) >> 32) as usize * count) >> 32
     };
     let mut squares = [0.0; CLUSTERS];
-    for (square, range) in squares.iter_mut().zip(clustered.starts.windows(2)) {
-        let vertices = &clustered.order[range[0] as usize..range[1] as usize];
-        for _ in 0..if vertices.is_empty() { 0 } else { pairs } {
-            let (_, at) = cell[below(cell.len())];
-            let light = vertices[below(vertices.len())];
-            let contribution = contribution(&pilot[at as usize], &pilot[light as usize], accel);
-            *square += contribution * contribution / pairs as f32;
+    let (mut rays, mut occluded) = (RayRows::default(), [false; BATCH]);
+    for _ in 0..pairs {
+        let (mut found, mut count) = ([(0, 0.0); BATCH], 0);
+        let mut contributions = [0.0; CLUSTERS];
+        let mut pair = [(0, 0); CLUSTERS];
+        for cluster in 0..CLUSTERS {
+            let vertices = clustered.of(cluster);
+            if !vertices.is_empty() {
+                pair[cluster] = (cell[below(cell.len())].1, vertices[below(vertices.len())]);
+                let (at, light) = pair[cluster];
+                contributions[cluster] = contribution(&pilot.points[at as usize], &pilot.vertices[light as usize]);
+            }
+        }
+        let least = LEAST_TRACED * contributions.iter().copied().fold(0.0, f32::max);
+        for (cluster, &contribution) in contributions.iter().enumerate().filter(|(_, c)| **c > least) {
+            let (at, light) = pair[cluster];
+            rays.set(count, &pilot.points[at as usize].ray_to(&pilot.vertices[light as usize].point));
+            found[count] = (cluster, contribution);
+            count += 1;
+        }
+        accel.occluded_rows(&rays, count, &mut occluded, Coherence::Incoherent);
+        for (&(cluster, contribution), _) in found[..count].iter().zip(&occluded).filter(|(_, occluded)| !**occluded) {
+            squares[cluster] += contribution * contribution / pairs as f32;
+        }
+        let visible = occluded[..count].iter().filter(|occluded| !**occluded).count() as f32 / count.max(1) as f32;
+        for (square, &contribution) in squares.iter_mut().zip(&contributions).filter(|(_, c)| **c <= least) {
+            *square += visible * contribution * contribution / pairs as f32;
         }
     }
     squares
 }
 
-/// What a light vertex adds to a diffuse point, both taken as diffuse, weighted by MIS.
-fn contribution(at: &LightVertex, light: &LightVertex, accel: &dyn Accelerator) -> f32 {
-    let toward = (light.point.p - at.point.p).as_vec3();
+/// What a light vertex that is visible adds to a point with this facing normal, both taken as diffuse, weighted by MIS.
+fn contribution(at: &SpawnPoint, light: &LightVertex) -> f32 {
+    let toward = (light.point.p - at.p).as_vec3();
     let distance_squared = toward.length_squared();
     let direction = toward * (1.0 / distance_squared.sqrt());
-    let (cos, cos_light) = (facing_normal(at).dot(direction), -facing_normal(light).dot(direction));
+    let (cos, cos_light) = (at.n.dot(direction), -facing_normal(light).dot(direction));
     // Not where the points are the same, either.
-    if !(cos > 0.0 && cos_light > 0.0) || accel.occluded(&at.point.ray_to(&light.point)) {
+    if !(cos > 0.0 && cos_light > 0.0) {
         return 0.0;
     }
     let geometry = cos_light / distance_squared;
@@ -278,7 +342,6 @@ mod tests {
     use super::*;
     use crate::color::Rgb;
     use crate::geometry::Hit;
-    use crate::geometry::SpawnPoint;
     use crate::id::LightId;
     use crate::integrator::bidirectional::PartialMis;
     use crate::math::{DVec3, Ray};
@@ -331,19 +394,29 @@ mod tests {
         (0..4096).map(|i| vertex(if is_floor { i } else { i + 4096 })).collect()
     }
 
+    fn facing_point(vertex: &LightVertex) -> SpawnPoint {
+        SpawnPoint { n: facing_normal(vertex), ..vertex.point }
+    }
+
     #[test]
     fn vertices_that_are_seen_are_chosen_more_often_and_all_with_their_probabilities() {
         let vertices = [rooms(true), rooms(false)].concat();
-        let tables = ConnectionTables::new(&vertices, &Wall, 1_000_000);
+        let points: Vec<SpawnPoint> = vertices.iter().map(facing_point).collect();
+        let tables = ConnectionTables::new(
+            &ConnectionPilot { vertices: &vertices, paths: 4096, points: &points },
+            &Wall,
+            1_000_000,
+        );
         let clustered = tables.clustered(&vertices);
         const CHOICES: u32 = 1 << 16;
-        for at in &vertices[..16] {
+        for at in &points[..16] {
             let (mut seen, mut weights, mut chosen) = (0, 0.0, vec![false; vertices.len()]);
             for i in 0..CHOICES {
                 let u = (f64::from(i) + 0.5) / f64::from(CHOICES);
-                let choice = tables.choose(tables.table(position(at), facing_normal(at)), &clustered, u).unwrap();
+                let choice = tables.choose(tables.table(at.p.as_vec3(), at.n), &clustered, u).unwrap();
                 let light = &vertices[choice.index];
-                seen += u32::from(contribution(at, light, &Wall) > 0.0);
+                let is_occluded = Wall.occluded(&at.ray_to(&light.point));
+                seen += u32::from(contribution(at, light) > 0.0 && !is_occluded);
                 weights += f64::from(choice.inverse_probability);
                 chosen[choice.index] = true;
             }
@@ -357,7 +430,9 @@ mod tests {
     #[test]
     fn points_far_from_the_pilot_and_pilots_of_one_vertex_have_choices() {
         let vertices = rooms(true);
-        let one = ConnectionTables::new(&vertices[..1], &Wall, 100);
+        let points = [facing_point(&vertices[0])];
+        let pilot = ConnectionPilot { vertices: &vertices[..1], paths: 1, points: &points };
+        let one = ConnectionTables::new(&pilot, &Wall, 100);
         let clustered = one.clustered(&vertices);
         for p in [Vec3::splat(1e30), Vec3::splat(f32::NAN), Vec3::ZERO] {
             for u in [0.0, 0.5, 1.0f64.next_down()] {

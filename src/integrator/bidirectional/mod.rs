@@ -12,9 +12,11 @@
 //! [`EPOCH`]: super::EPOCH
 
 mod connection_tables;
+mod distant;
 mod emitters;
 
-pub use connection_tables::{ChosenVertex, ClusteredVertices, ConnectionTables};
+pub use connection_tables::{ChosenVertex, ClusteredVertices, ConnectionPilot, ConnectionTables};
+pub use distant::DistantRay;
 pub use emitters::Emitters;
 
 use crate::bsdf::Bsdf;

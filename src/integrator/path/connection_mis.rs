@@ -29,8 +29,21 @@ impl ConnectionState {
         if self.d_vc == 0.0 {
             return 0.0;
         }
-        let pdf = squared(emitters.pdf_per_cos(context.scene, id, n));
-        bounded(pdf * CONNECTIONS_PER_VERTEX * CONNECTIONS_PER_VERTEX * self.d_vc)
+        self.against(emitters.pdf_per_cos(context.scene, id, n))
+    }
+
+    /// The same for the light of a light at infinity, from the last vertex `p` along the unit `direction`.
+    #[inline]
+    pub fn of_miss(&self, context: &Context, id: LightId, p: Vec3, direction: Vec3) -> f64 {
+        let Some(LightPaths { emitters, .. }) = context.pass.light_paths else { return 0.0 };
+        if self.d_vc == 0.0 {
+            return 0.0;
+        }
+        self.against(emitters.pdf_from_infinity(context.scene, id, p, direction))
+    }
+
+    fn against(&self, emitted_pdf: f32) -> f64 {
+        bounded(squared(emitted_pdf) * CONNECTIONS_PER_VERTEX * CONNECTIONS_PER_VERTEX * self.d_vc)
     }
 }
 
@@ -135,17 +148,20 @@ fn find_next(vertices: &Vertices, densities: &mut DensityRows, mis: &mut MisRows
 pub(super) fn reweigh_light_samples(context: &Context, wave: &mut Wave) {
     let Some(LightPaths { emitters, .. }) = context.pass.light_paths else { return };
     let Wave { vertices, connection_mis: ConnectionMis { mis, densities }, bsdf_rows, .. } = wave;
-    let Vertices { count, rows, light_samples, light_evals, direct, bsdfs, non_diffuse, .. } = vertices;
+    let Vertices { count, rows, points, light_samples, light_evals, direct, bsdfs, non_diffuse, .. } = vertices;
     let is_weighed = |lane: usize| {
-        let is_point = light_samples.target[lane] == light_target::POINT;
-        direct.status[lane] == spawn::SPAWNED && is_point && light_samples.is_delta[lane] == 0
+        let (target, is_delta) = (light_samples.target[lane], light_samples.is_delta[lane] != 0);
+        direct.status[lane] == spawn::SPAWNED && (target == light_target::INFINITY || !is_delta)
     };
     for lane in 0..(*count).min(BATCH) {
-        densities.emitted[lane] = if is_weighed(lane) {
-            let (light, n) = (LightId(light_samples.light[lane]), light_samples.target_n.get(lane));
-            emitters.pdf_per_cos(context.scene, light, n)
-        } else {
-            0.0
+        let light = LightId(light_samples.light[lane]);
+        densities.emitted[lane] = match light_samples.target[lane] {
+            _ if !is_weighed(lane) => 0.0,
+            light_target::POINT => emitters.pdf_per_cos(context.scene, light, light_samples.target_n.get(lane)),
+            _ => {
+                let (p, wi) = (points.p.get(lane).as_vec3(), light_samples.direction.get(lane));
+                emitters.pdf_from_infinity(context.scene, light, p, wi)
+            }
         };
     }
     let surfaces = Surfaces { scene: context.scene, count: *count, rows, bsdfs, non_diffuse };
@@ -175,7 +191,8 @@ fn reweigh(lights: &LightWeights, contribution: &mut [Row; 3], count: usize) {
         let partial = PartialMis { d_vcm: mis.d_vcm[i], d_vc: mis.d_vc[i] };
         let connections = squared(densities.emitted[i] * cos) * CONNECTIONS_PER_VERTEX * CONNECTIONS_PER_VERTEX / pdf
             * partial.sum(densities.reversed[i]);
-        let others = 1.0 + squared(light_evals.pdf[i]) / pdf;
+        let by_bsdf = if light_samples.is_delta[i] == 0 { squared(light_evals.pdf[i]) } else { 0.0 };
+        let others = 1.0 + by_bsdf / pdf;
         let factor = (1.0 / (1.0 + bounded(connections / others))) as f32;
         for row in contribution.iter_mut() {
             row[i] *= factor;

@@ -10,7 +10,9 @@ use super::evals::Surfaces;
 use super::wave::Wave;
 use crate::color::Rgb;
 use crate::geometry::SpawnPoint;
-use crate::integrator::bidirectional::{ChosenVertex, LightPaths, PartialMis, Scattering, bounded, squared};
+use crate::integrator::bidirectional::{
+    ChosenVertex, ConnectionTables, LightPaths, PartialMis, Scattering, bounded, squared,
+};
 use crate::integrator::dimensions;
 use crate::integrator::vertex::HemisphereTest;
 use crate::light::LightSampleRows;
@@ -24,7 +26,9 @@ soa! {
     pub(super) struct LightVertexRows {
         /// Whether the vertices can be connected.
         is_chosen: u32,
-        /// One over the probability of the choice.
+        /// With which probability there is a connection at all; 0 if there is none.
+        probability: f32,
+        /// One over that times the probability of the choice.
         inverse_probability: f32,
         /// The next seven as in [`LightVertex`](crate::integrator::LightVertex).
         n: Vec3,
@@ -96,6 +100,10 @@ pub(super) fn sample(context: &Context, wave: &mut Wave, block: usize) {
     wave.queue_shadow_rays(context, block, 1);
 }
 
+/// Connections are made with this many times the probability of their shadow rays, as far as that is expected: what
+/// they add varies.
+const EXPECTED_SCALE: f32 = 2.0;
+
 /// Draws the numbers that choose light vertices.
 fn draw(context: &Context, wave: &mut Wave) {
     let Vertices { requests, count, u_light, .. } = &mut wave.vertices;
@@ -112,7 +120,12 @@ fn choose<'a>(context: &Context, wave: &mut Wave, light_paths: &LightPaths<'a>) 
     for (lane, table) in table_indices.iter_mut().enumerate().take(vertices.count) {
         *table = tables.table(vertices.points.p.get(lane).as_vec3(), vertices.facing_normal(lane));
     }
+    choose_connected(context, vertices, tables, &table_indices, ends);
     for (lane, index) in indices.iter_mut().enumerate().take(vertices.count) {
+        if ends.probability[lane] == 0.0 {
+            ends.inverse_probability[lane] = 0.0;
+            continue;
+        }
         let [u, digits, ..] = vertices.u_light.of(lane);
         // Random numbers are multiples of 2^-24.
         let u = f64::from(u) + f64::from(digits) * (1.0 / 16_777_216.0);
@@ -120,16 +133,18 @@ fn choose<'a>(context: &Context, wave: &mut Wave, light_paths: &LightPaths<'a>) 
         // In an empty cluster there is nothing to connect to.
         let ChosenVertex { index: chosen, inverse_probability } =
             choice.unwrap_or(ChosenVertex { index: 0, inverse_probability: 0.0 });
-        (*index, ends.inverse_probability[lane]) = (chosen, inverse_probability);
+        (*index, ends.inverse_probability[lane]) = (chosen, inverse_probability / ends.probability[lane]);
         prefetch(all, *index);
     }
     let mut scatterings = [None; BATCH];
     for (lane, scattering) in scatterings.iter_mut().enumerate().take(vertices.count) {
+        if ends.inverse_probability[lane] == 0.0 {
+            ends.is_chosen[lane] = 0;
+            continue;
+        }
         let vertex = &all[indices[lane]];
         let is_short = context.bounce + 2 + vertex.segments <= context.config.max_depth;
-        let is_chosen = is_short
-            && ends.inverse_probability[lane] > 0.0
-            && vertices.rows.flags[lane] & vertex_flags::UNSAMPLED == 0;
+        let is_chosen = is_short && vertices.rows.flags[lane] & vertex_flags::UNSAMPLED == 0;
         ends.is_chosen[lane] = u32::from(is_chosen);
         *scattering = vertex.scattering.as_deref().filter(|_| is_chosen);
         if let Some(scattering) = scattering {
@@ -147,6 +162,27 @@ fn choose<'a>(context: &Context, wave: &mut Wave, light_paths: &LightPaths<'a>) 
         (mis.unconnected_d_vcm[lane], mis.unconnected_d_vc[lane]) = (vertex.unconnected.d_vcm, vertex.unconnected.d_vc);
     }
     scatterings
+}
+
+/// Russian roulette of connections, before anything is found out of the vertices of light paths.
+fn choose_connected(
+    context: &Context,
+    vertices: &Vertices,
+    tables: &ConnectionTables,
+    table_indices: &[usize; BATCH],
+    ends: &mut LightVertexRows,
+) {
+    for (lane, &table) in table_indices.iter().enumerate().take(vertices.count) {
+        let probability = context.pass.continuations.map_or(1.0, |grid| {
+            let expected = vertices.rows.throughput.get(lane).max_channel() * tables.radiance(table);
+            grid.shadow_ray_probability(EXPECTED_SCALE * expected, vertices.rows.rr_scale[lane])
+        });
+        let [.., u] = vertices.u_light.of(lane);
+        ends.probability[lane] = if u < probability { probability } else { 0.0 };
+        if u < probability {
+            tables.prefetch(table);
+        }
+    }
 }
 
 /// Finds the directions to the chosen vertices, and how these scatter light if they are diffuse.
@@ -243,8 +279,9 @@ fn find_moments(pairs: &Pairs, densities: &mut DensityRows, direct: &DirectRows,
             squared(evals.pdf[i] * cos_light / ends.distance_squared[i]) * unconnected.sum(ends.pdf_to_light[i]);
         let ratio = (1.0 / (density.sqrt() * f64::from(densities.weight[i]))) as f32;
         // Times the light before roulette, which is divided by that after it.
-        densities.moment_ratio[i] =
-            if ratio < f32::INFINITY { ratio } else { 1.0 } * direct.contribution.get(i).max_channel();
+        densities.moment_ratio[i] = if ratio < f32::INFINITY { ratio } else { 1.0 }
+            * direct.contribution.get(i).max_channel()
+            * ends.probability[i];
     }
 }
 

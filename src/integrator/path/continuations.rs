@@ -6,8 +6,9 @@ use super::block::{Vertices, spawn};
 use super::radiance::Output;
 use super::wave::PathRows;
 use crate::color::Rgb;
-use crate::integrator::{Continuation, PilotRecords};
-use crate::math::Vec3;
+use crate::id::LightId;
+use crate::integrator::{Continuation, DistantRay, PilotRecords};
+use crate::math::{Ray, Vec3};
 
 /// Rays of a vertex beyond the recorded one: the ray that goes on and the shadow ray.
 const RAYS_OF_VERTEX: f32 = 2.0;
@@ -38,6 +39,11 @@ pub(super) struct ContinuationRecorder {
     specular: Vec<Range<usize>>,
     /// What they bring less what those towards the second lights bring, by sample.
     light_differences: Vec<f32>,
+    /// By shadow ray of the wave, its light.
+    lights: Vec<LightId>,
+    distant_rays: Vec<DistantRay>,
+    distant_contribution: f32,
+    near_contribution: f32,
 }
 
 impl ContinuationRecorder {
@@ -68,6 +74,32 @@ impl ContinuationRecorder {
         if self.is_enabled {
             let status = &vertices.direct.status[..vertices.count];
             self.shadow_rays += status.iter().filter(|&&status| status == spawn::SPAWNED).count() as u64;
+        }
+    }
+
+    /// Keeps the lights of shadow rays of the wave, in their order.
+    pub fn keep_lights(&mut self, lights: impl Iterator<Item = LightId>) {
+        if self.is_enabled {
+            self.lights.extend(lights);
+        }
+    }
+
+    /// Records the light of a shadow ray of the wave that nothing blocks.
+    pub fn add_shadow_ray(&mut self, index: usize, ray: &Ray, light: Rgb) {
+        let Some(&id) = self.lights.get(index) else { return };
+        if ray.t_max == f32::INFINITY {
+            self.add_distant(id, ray, light);
+        } else {
+            self.near_contribution += light.max_channel();
+        }
+    }
+
+    /// Records the light of a light at infinity along a ray.
+    pub fn add_distant(&mut self, light: LightId, ray: &Ray, added: Rgb) {
+        if self.is_enabled {
+            let contribution = added.max_channel();
+            self.distant_contribution += contribution;
+            self.distant_rays.push(DistantRay { light, p: ray.origin, wi: ray.direction, contribution });
         }
     }
 
@@ -121,6 +153,7 @@ impl ContinuationRecorder {
             path.radiance_before = out.batch.pixels[path.slot as usize].radiance;
         }
         self.marked = self.scattered.len();
+        self.lights.clear();
     }
 
     /// Appends what the wave of `samples` samples has found, and records no longer.
@@ -138,6 +171,9 @@ impl ContinuationRecorder {
         records.further_shadow_rays += self.first_lights.iter().map(|range| range.len() as u64).sum::<u64>();
         self.light_differences.resize(samples, 0.0);
         records.light_differences.append(&mut self.light_differences);
+        records.distant_rays.append(&mut self.distant_rays);
+        records.distant_contribution += self.distant_contribution;
+        records.near_contribution += self.near_contribution;
         *self = Self::default();
     }
 }

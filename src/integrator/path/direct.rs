@@ -60,7 +60,12 @@ fn sample_once(context: &Context, regions: Option<&Regions>, wave: &mut Wave, bl
     let mis = context.config.strategy == Strategy::Mis;
     let weighting = Weighting { mis, light_samples: context.light_samples() as f32, darkens_bumps: true };
     weigh(context, vertices, weighting);
-    super::connection_mis::reweigh_light_samples(context, wave);
+    if context.pass.light_paths.is_some() {
+        if let Some(grid) = context.pass.continuations {
+            drop_untraced(grid, &mut wave.vertices);
+        }
+        super::connection_mis::reweigh_light_samples(context, wave);
+    }
     finish_shadow_rays(context, wave, block);
 }
 
@@ -168,6 +173,17 @@ fn illuminate<const PERTURBED: bool>(
         direct.shadow_origin.set(i, choose_vector(near.origin, far.origin));
         direct.shadow_direction.set(i, choose_vector(near.direction, far.direction));
         direct.shadow_end[i] = choose(near.t_max, far.t_max);
+    }
+}
+
+/// Drops the shadow rays that [`play_roulette`] will drop whatever their weight against connections.
+fn drop_untraced(grid: &ContinuationGrid, vertices: &mut Vertices) {
+    let Vertices { rows, direct, u_bsdf, count, .. } = vertices;
+    for i in 0..(*count).min(BATCH) {
+        let largest = direct.contribution.get(i).max_channel();
+        if 1.0 - u_bsdf.of(i)[3] > grid.shadow_ray_probability(largest, rows.rr_scale[i]) {
+            direct.status[i] = spawn::NONE;
+        }
     }
 }
 

@@ -25,6 +25,8 @@ pub(super) struct LightPathState {
     start: SpawnPoint,
     /// Density per area and solid angle of its first segment, over the cosine with the light's normal.
     pdf_per_cos: f32,
+    /// Whether no path from the camera meets the light.
+    is_delta: bool,
     /// As of the last vertex: [`PartialMis::d_vc`], and the part of it that is not of connections.
     d_vc: f64,
     unconnected_d_vc: f64,
@@ -90,7 +92,8 @@ fn start(context: &Context, source: &Source, wave: &mut Wave) {
             continue;
         }
         samples.push(&CameraSample { ray: point.ray_along(direction), seed, sample: index });
-        states.push(LightPathState { light, start: point, pdf_per_cos, d_vc: 0.0, unconnected_d_vc: 0.0 });
+        let is_delta = context.scene.lights.get(light).is_delta();
+        states.push(LightPathState { light, start: point, pdf_per_cos, is_delta, d_vc: 0.0, unconnected_d_vc: 0.0 });
         fluxes.push(flux);
     }
     wave.start(context, &samples);
@@ -160,17 +163,23 @@ fn arrived(context: &Context, vertices: &Vertices, lane: usize, paths: &PathRows
     // The first vertex samples the light, or meets it by chance.
     let sampled = light_pdf(context, vertices, lane, state);
     let start = squared(state.pdf_per_cos) * cos * CONNECTIONS_PER_VERTEX * CONNECTIONS_PER_VERTEX;
-    let mis = PartialMis { d_vcm: squared(sampled) / start, d_vc: 1.0 / start };
+    let mis = PartialMis { d_vcm: squared(sampled) / start, d_vc: if state.is_delta { 0.0 } else { 1.0 / start } };
     Arrived { mis, unconnected: mis }
 }
 
 /// The density per solid angle with which a path from the camera samples the light from the vertex.
 fn light_pdf(context: &Context, vertices: &Vertices, lane: usize, state: &LightPathState) -> f32 {
-    let Light::Area(light) = context.scene.lights.get(state.light) else { return 0.0 };
     if vertices.rows.flags[lane] & vertex_flags::UNSAMPLED != 0 {
         return 0.0;
     }
     let from = vertices.light_context(lane);
+    let pmf = context.scene.lights.pmf(state.light, &from, context.compensation);
+    let direction = vertices.rows.direction.get(lane);
+    let light = match context.scene.lights.get(state.light) {
+        Light::Area(light) => light,
+        light if light.is_delta() => return pmf,
+        light => return pmf * light.eval_infinite(-direction, context.compensation).pdf,
+    };
     let at = SurfaceInteraction {
         p: state.start.p,
         t: vertices.rows.t[lane],
@@ -184,9 +193,8 @@ fn light_pdf(context: &Context, vertices: &Vertices, lane: usize, state: &LightP
         instance: Hit::NO_INSTANCE,
         time: 0.0,
     };
-    let ray = Ray::new(from.p.as_vec3(), -vertices.rows.direction.get(lane));
-    light.pdf(&context.scene.geometry, from.p, &ray, &at)
-        * context.scene.lights.pmf(state.light, &from, context.compensation)
+    let ray = Ray::new(from.p.as_vec3(), -direction);
+    light.pdf(&context.scene.geometry, from.p, &ray, &at) * pmf
 }
 
 /// Scatters a light path: its flux, roulette by what scattering leaves of it, and the sums of other strategies.
@@ -220,7 +228,12 @@ fn scatter_light(
     };
     (state.d_vc, state.unconnected_d_vc) = (d_vc, unconnected_d_vc);
     let survival = (next.max_channel() / flux.max_channel()).min(1.0);
-    let goes_on = scatter.status[lane] == spawn::SPAWNED && vertices.u_bsdf.of(lane)[3] < survival && next.is_finite();
+    // Paths from the camera do not find the light of delta lights behind delta lobes.
+    let is_found = !(state.is_delta && is_delta && context.bounce == 0);
+    let goes_on = scatter.status[lane] == spawn::SPAWNED
+        && vertices.u_bsdf.of(lane)[3] < survival
+        && next.is_finite()
+        && is_found;
     let scatter = &mut vertices.scatter;
     scatter.status[lane] = if goes_on { spawn::SPAWNED } else { spawn::NONE };
     scatter.throughput.set(lane, if goes_on { next * (1.0 / survival) } else { Rgb::BLACK });

@@ -2,6 +2,7 @@
 
 use super::Context;
 use super::caustics::CausticState;
+use super::connection_mis::ConnectionState;
 use super::radiance::Output;
 use super::surface_aovs::write_miss;
 use super::wave::{PathRows, Wave};
@@ -22,7 +23,7 @@ pub(super) struct MissScratch {
 
 /// Adds the light that a block's paths meet which leave the scene.
 pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Output) {
-    let Wave { vertices, paths, rays, light_aovs, miss, caustics, moments, .. } = wave;
+    let Wave { vertices, paths, rays, light_aovs, miss, caustics, connections, moments, continuations, .. } = wave;
     let (paths, rays, misses) = (&paths[block], &rays[block], &vertices.misses);
     let is_black = context.scene.lights.at_infinity().is_empty();
     let needs_aovs = context.config.needs_light_aovs() || context.needs_surface_aovs();
@@ -44,7 +45,8 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
         let i = usize::from(path);
         let direction = directions.get(k);
         let known = image.map(|(id, _)| (id, InfiniteLightEval { radiance: evals.radiance.get(k), pdf: evals.pdf[k] }));
-        let miss = Miss { paths, i, direction, known, caustic: caustics.get(block * BATCH + i) };
+        let (caustic, connection) = (caustics.get(block * BATCH + i), connections.get(block * BATCH + i));
+        let miss = Miss { paths, i, direction, known, caustic, connection };
         let slot = paths.slot[i];
         if is_visible {
             if context.bounce == 0 {
@@ -52,6 +54,15 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
             }
             let light = context.config.clamped(paths.throughput.get(i) * miss.radiance(context), context.bounce);
             out.add(slot, light);
+            if continuations.is_enabled() && context.bounce > 0 {
+                for &id in context.scene.lights.at_infinity() {
+                    continuations.add_distant(
+                        id,
+                        &rays.get(i),
+                        paths.throughput.get(i) * miss.radiance_of(context, id),
+                    );
+                }
+            }
             if moments.needs_emission && paths.is_specular(i) {
                 let unweighted = Miss { caustic: None, ..miss }.radiance(context);
                 moments.add_emission(slot, light, paths.throughput.get(i) * unweighted);
@@ -78,6 +89,7 @@ struct Miss<'a> {
     /// An environment and what it emits there, if that has been looked up already.
     known: Option<(LightId, InfiniteLightEval)>,
     caustic: Option<&'a CausticState>,
+    connection: Option<&'a ConnectionState>,
 }
 
 impl Miss<'_> {
@@ -89,7 +101,7 @@ impl Miss<'_> {
 
     #[inline(always)]
     fn radiance_of(&self, context: &Context, id: LightId) -> Rgb {
-        let Self { paths, i, direction, known, caustic } = *self;
+        let Self { paths, i, direction, known, caustic, connection } = *self;
         let lights = &context.scene.lights;
         let InfiniteLightEval { radiance, pdf } = match known {
             Some((known, eval)) if known == id => eval,
@@ -98,10 +110,14 @@ impl Miss<'_> {
         if radiance.is_black() {
             return Rgb::BLACK;
         }
-        radiance
-            * super::emission::bsdf_mis_weight(context, paths, i, caustic, |from| {
-                pdf * lights.pmf(id, from, context.compensation)
-            })
+        let mut weight = super::emission::bsdf_mis_weight(context, paths, i, caustic, |from| {
+            pdf * lights.pmf(id, from, context.compensation)
+        });
+        if let Some(connection) = connection {
+            let connections = connection.of_miss(context, id, paths.from(i).p.as_vec3(), direction);
+            weight = (f64::from(weight) / (1.0 + f64::from(weight) * connections)) as f32;
+        }
+        radiance * weight
     }
 
     #[inline(never)]

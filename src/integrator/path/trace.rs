@@ -51,6 +51,9 @@ pub(super) fn shadow(context: &Context, wave: &mut Wave, out: &mut Output, count
             let (slot, light) = (rows.slot[i % BATCH], rows.contribution.get(i % BATCH));
             out.add(slot, light);
             wave.moments.add_shadow_ray(i, slot, light);
+            if wave.continuations.is_enabled() {
+                wave.continuations.add_shadow_ray(i, &rays.get(i % BATCH), light);
+            }
             if context.bounce == 0 {
                 wave.continuations.add_direct(i, slot, light);
             }

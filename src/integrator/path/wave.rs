@@ -306,6 +306,10 @@ impl Wave {
                 self.light_aovs.shadow_sources.push((event, LightId(self.vertices.light_samples.light[lane])));
             }
         }
+        if self.continuations.is_enabled() {
+            let light = |lane| LightId(self.vertices.light_samples.light[lane]);
+            self.continuations.keep_lights((0..BATCH).filter(|&lane| lanes.contains(lane)).map(light));
+        }
         if self.moments.has_ratios {
             let ratio = |lane| if scatterings > 0 { self.connection_mis.densities.moment_ratio[lane] } else { 1.0 };
             self.moments.ratios.extend((0..BATCH).filter(|&lane| lanes.contains(lane)).map(ratio));
