@@ -104,6 +104,9 @@ pub(super) fn sample(context: &Context, wave: &mut Wave, block: usize) {
 /// they add varies.
 const EXPECTED_SCALE: f32 = 2.0;
 
+/// The least probability of a connection: the pilot may have missed all light that arrives in a cell.
+const LEAST_CONNECTED: f32 = 1.0 / 16.0;
+
 /// Draws the numbers that choose light vertices.
 fn draw(context: &Context, wave: &mut Wave) {
     let Vertices { requests, count, u_light, .. } = &mut wave.vertices;
@@ -175,7 +178,8 @@ fn choose_connected(
     for (lane, &table) in table_indices.iter().enumerate().take(vertices.count) {
         let probability = context.pass.continuations.map_or(1.0, |grid| {
             let expected = vertices.rows.throughput.get(lane).max_channel() * tables.radiance(table);
-            grid.shadow_ray_probability(EXPECTED_SCALE * expected, vertices.rows.rr_scale[lane])
+            let probability = grid.shadow_ray_probability(EXPECTED_SCALE * expected, vertices.rows.rr_scale[lane]);
+            probability.max(LEAST_CONNECTED)
         });
         let [.., u] = vertices.u_light.of(lane);
         ends.probability[lane] = if u < probability { probability } else { 0.0 };
