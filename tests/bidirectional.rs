@@ -97,9 +97,12 @@ fn glossy() -> Value {
     )
 }
 
+fn quad(material: &str, origin: [f64; 3], edge_u: [f64; 3], edge_v: [f64; 3]) -> Value {
+    json!({ "type": "quad", "material": material, "origin": origin, "edge_u": edge_u, "edge_v": edge_v })
+}
+
 /// A room that sun and sky light by a window of two halves, one of them glazed, with a mirror.
 fn window() -> Value {
-    let quad = |material: &str, origin: [f64; 3], u: [f64; 3], v: [f64; 3]| json!({ "type": "quad", "material": material, "origin": origin, "edge_u": u, "edge_v": v });
     json!({
         "camera": { "position": [1.2, 1.6, 3.5], "look_at": [-0.5, 1, 0], "vertical_fov_degrees": 50 },
         "film": { "width": 72, "height": 72, "filter": { "type": "box" } },
