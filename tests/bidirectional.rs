@@ -101,12 +101,12 @@ fn quad(material: &str, origin: [f64; 3], edge_u: [f64; 3], edge_v: [f64; 3]) ->
     json!({ "type": "quad", "material": material, "origin": origin, "edge_u": edge_u, "edge_v": edge_v })
 }
 
-/// A room that sun and sky light by a window of two halves, one of them glazed, with a mirror.
+/// A room that two suns and a sky light by a window, half of it glazed, with a mirror; with roulette of connections.
 fn window() -> Value {
     json!({
         "camera": { "position": [1.2, 1.6, 3.5], "look_at": [-0.5, 1, 0], "vertical_fov_degrees": 50 },
         "film": { "width": 72, "height": 72, "filter": { "type": "box" } },
-        "integrator": { "type": "path", "max_depth": 6, "rr_depth": 5 },
+        "integrator": { "type": "path", "max_depth": 6, "roulette": "auto" },
         "materials": {
             "white": { "type": "diffuse", "albedo": 0.7 }, "mirror": { "type": "mirror" },
             "glass": { "type": "thin_dielectric" }, "car": { "type": "plastic", "albedo": [0.6, 0.3, 0.2] }

@@ -46,25 +46,6 @@ pub fn cell_count(side: usize) -> usize {
     side.pow(3) * OCTANTS
 }
 
-/// Points at either end of an axis that may lie outside of a grid, of all.
-const OUTLIERS: f64 = 0.005;
-
-/// The box around all points but a few at its ends.
-pub fn bounds_without_outliers(points: &[Vec3]) -> Aabb {
-    let mut bounds = Aabb::EMPTY;
-    if points.is_empty() {
-        return bounds;
-    }
-    let outliers = (points.len() as f64 * OUTLIERS) as usize;
-    for k in 0..3 {
-        let mut coordinates: Vec<f32> = points.iter().map(|point| point[k]).collect();
-        coordinates.sort_unstable_by(f32::total_cmp);
-        bounds.min[k] = coordinates[outliers];
-        bounds.max[k] = coordinates[coordinates.len() - 1 - outliers];
-    }
-    bounds
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

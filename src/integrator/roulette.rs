@@ -3,7 +3,7 @@
 //! pixel, over the root of what going on costs.
 
 use super::bidirectional::DistantRay;
-use super::octant_grid::{OctantGrid, bounds_without_outliers, cell_count};
+use super::octant_grid::{OctantGrid, cell_count};
 use crate::desc::DEFAULT_RR_DEPTH;
 use crate::math::rows::{BATCH, DVec3Rows, Row, Vec3Rows};
 use crate::math::vectorize::vectorize;
@@ -96,10 +96,8 @@ pub struct PilotRecords {
     pub light_differences: Vec<f32>,
     /// Rays of lights at infinity.
     pub distant_rays: Vec<DistantRay>,
-    /// What these add to the samples, by the largest channel.
-    pub distant_contribution: f32,
-    /// What shadow rays towards other lights add.
-    pub near_contribution: f32,
+    /// What shadow rays towards other lights add to the samples, by the largest channel.
+    pub near_contribution: f64,
 }
 
 impl PilotRecords {
@@ -111,7 +109,6 @@ impl PilotRecords {
         self.further_shadow_rays += other.further_shadow_rays;
         self.light_differences.append(&mut other.light_differences);
         self.distant_rays.append(&mut other.distant_rays);
-        self.distant_contribution += other.distant_contribution;
         self.near_contribution += other.near_contribution;
     }
 
@@ -123,7 +120,16 @@ impl PilotRecords {
 
     /// The box around all points where paths were scattered but a few at its ends.
     pub fn bounds(&self) -> Aabb {
-        bounds_without_outliers(&positions(&self.finite_continuations()))
+        let mut bounds = Aabb::EMPTY;
+        let records = self.finite_continuations();
+        let outliers = (records.len() as f64 * OUTLIERS) as usize;
+        for k in 0..if records.is_empty() { 0 } else { 3 } {
+            let mut coordinates: Vec<f32> = records.iter().map(|record| record.p[k]).collect();
+            coordinates.sort_unstable_by(f32::total_cmp);
+            bounds.min[k] = coordinates[outliers];
+            bounds.max[k] = coordinates[coordinates.len() - 1 - outliers];
+        }
+        bounds
     }
 }
 
@@ -135,6 +141,9 @@ const PRIOR_RECORDS: f64 = 8.0;
 
 /// A record counts with this many times the mean radiance at most.
 const MAX_RADIANCE: f32 = 20.0;
+
+/// Records at either end of an axis that may lie outside of the grid, of all.
+const OUTLIERS: f64 = 0.005;
 
 /// By where a path is scattered, the root of the mean squared radiance that it finds over the rays that takes.
 #[derive(Clone, Debug)]
@@ -179,10 +188,9 @@ impl ContinuationGrid {
         if !(mean > 0.0 && mean < f32::INFINITY) {
             return None;
         }
-        let bounds = bounds_without_outliers(&positions(&records));
         let unoccluded = if pilot.shadow_rays > 0 { pilot.unoccluded as f32 / pilot.shadow_rays as f32 } else { 1.0 };
         let mut grid = Self {
-            cells: OctantGrid::new(&bounds),
+            cells: OctantGrid::new(&pilot.bounds()),
             roots: Vec::new(),
             scale: 1.0,
             shadow_scale: SHADOW_SCALE * unoccluded.sqrt(),
@@ -238,10 +246,6 @@ fn find_cells(grid: &ContinuationGrid, points: &DVec3Rows, normals: &Vec3Rows, c
         let n = normals.get(i) * 1f32.copysign(cos_side[i]);
         *cell = grid.cells.cell(points.get(i).as_vec3(), n);
     }
-}
-
-fn positions(records: &[Continuation]) -> Vec<Vec3> {
-    records.iter().map(|record| record.p).collect()
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use crate::integrator::{
     ClusteredVertices, ConnectionPilot, ConnectionTables, EPOCH, Emitters, Integrator, LightPaths, LightVertex,
     PassContext, PhotonRange, PilotRecords, RayCounts,
 };
+use crate::math::Aabb;
 use crate::sampling::{PixelSeed, Sampler};
 use crate::scene::Scene;
 
@@ -37,8 +38,9 @@ const TABLE_EPOCH: u32 = u32::MAX;
 pub(super) struct LightPathPass {
     /// Where they start, once that is known.
     emitters: Option<Emitters>,
-    /// Points where paths from the camera were scattered, with their facing normals.
+    /// Points where paths from the camera were scattered, with their facing normals, and the box around most of them.
     points: Arc<[SpawnPoint]>,
+    bounds: Aabb,
     /// Whether they are those of the pilot.
     is_pilot: bool,
     /// Light paths of an epoch.
@@ -76,24 +78,35 @@ impl LightPathPass {
         let traced = (PATHS_PER_PIXEL * width * height).clamp(*PATHS.start(), *PATHS.end()) as u32;
         let pixels = (width * height) as u64;
         let points = Arc::default();
-        Some(Self { emitters: None, points, is_pilot: false, traced, pixels, tables: None, vertices: None })
+        Some(Self {
+            emitters: None,
+            points,
+            bounds: Aabb::EMPTY,
+            is_pilot: false,
+            traced,
+            pixels,
+            tables: None,
+            vertices: None,
+        })
     }
 
     /// As many light paths as a pilot needs.
     pub fn for_pilot(&self) -> Self {
-        let (emitters, points, traced) = (self.emitters.clone(), self.points.clone(), self.pilot_paths());
-        Self { emitters, points, is_pilot: true, traced, pixels: self.pixels, tables: None, vertices: None }
+        let (emitters, points) = (self.emitters.clone(), self.points.clone());
+        Self { emitters, points, is_pilot: true, traced: self.pilot_paths(), tables: None, vertices: None, ..*self }
     }
 
     /// With what a pilot of paths from the camera has found; `None` if no light path can start.
     pub fn with_pilot(self, scene: &Scene, pilot: &PilotRecords) -> Option<Self> {
+        let bounds = pilot.bounds();
         let step = pilot.continuations.len().div_ceil(MAX_POINTS).max(1);
         let points = pilot.continuations.iter().step_by(step).filter(|record| record.p.is_finite()).map(|record| {
             // The point was rounded.
             let error = f32::EPSILON * record.p.abs().max_element();
             SpawnPoint { p: record.p.as_dvec3(), n: record.n, error }
         });
-        Some(Self { emitters: Some(Emitters::new(scene, pilot)?), points: points.collect(), ..self })
+        let emitters = Some(Emitters::new(scene, pilot, bounds)?);
+        Some(Self { emitters, points: points.collect(), bounds, ..self })
     }
 
     /// Light paths of an epoch over those of the pilot.
@@ -140,7 +153,12 @@ impl LightPathPass {
             Some((_, tables)) => tables,
             None => {
                 let (vertices, _) = trace(TABLE_EPOCH, pilot_paths);
-                let pilot = ConnectionPilot { vertices: &vertices, paths: pilot_paths, points: &self.points };
+                let pilot = ConnectionPilot {
+                    vertices: &vertices,
+                    paths: pilot_paths,
+                    points: &self.points,
+                    bounds: self.bounds,
+                };
                 let rays = TABLE_RAYS_PER_PIXEL[stage] * self.pixels;
                 ConnectionTables::new(&pilot, pass.world.accel, rays)
             }

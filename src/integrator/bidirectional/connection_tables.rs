@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::{LightVertex, bounded, squared};
 use crate::accel::{Accelerator, Coherence};
 use crate::geometry::SpawnPoint;
-use crate::integrator::octant_grid::{OctantGrid, bounds_without_outliers, cell_count};
+use crate::integrator::octant_grid::{OctantGrid, cell_count};
 use crate::math::prefetch::prefetch;
 use crate::math::random::hash64;
 use crate::math::rows::BATCH;
@@ -78,6 +78,8 @@ pub struct ConnectionPilot<'a> {
     pub paths: u32,
     /// Where paths from the camera were scattered, with the normals on their side.
     pub points: &'a [SpawnPoint],
+    /// The box around most of these.
+    pub bounds: Aabb,
 }
 
 /// A light vertex that was chosen.
@@ -99,14 +101,13 @@ impl ClusteredVertices {
 impl ConnectionTables {
     /// From a pilot, with about this many shadow rays.
     pub fn new(pilot: &ConnectionPilot, accel: &dyn Accelerator, rays: u64) -> Self {
-        let ConnectionPilot { vertices, points, paths } = *pilot;
+        let ConnectionPilot { vertices, paths, points, bounds } = *pilot;
         let mut indices: Vec<u32> = (0..vertices.len() as u32).collect();
         let mut splits = vec![(0, f32::INFINITY); CLUSTERS - 1];
         split(vertices, &mut indices, 0, &mut splits);
-        let positions: Vec<Vec3> = points.iter().map(|point| point.p.as_vec3()).collect();
         let mut tables = Self {
             splits,
-            grid: OctantGrid::new(&bounds_without_outliers(&positions)),
+            grid: OctantGrid::new(&bounds),
             table_indices: vec![0; cell_count(GRID_SIDE)],
             tables: Vec::new(),
             radiances: Vec::new(),
@@ -402,8 +403,9 @@ mod tests {
     fn vertices_that_are_seen_are_chosen_more_often_and_all_with_their_probabilities() {
         let vertices = [rooms(true), rooms(false)].concat();
         let points: Vec<SpawnPoint> = vertices.iter().map(facing_point).collect();
+        let bounds = bounds_of(vertices.iter().map(position));
         let tables = ConnectionTables::new(
-            &ConnectionPilot { vertices: &vertices, paths: 4096, points: &points },
+            &ConnectionPilot { vertices: &vertices, paths: 4096, points: &points, bounds },
             &Wall,
             1_000_000,
         );
@@ -431,7 +433,7 @@ mod tests {
     fn points_far_from_the_pilot_and_pilots_of_one_vertex_have_choices() {
         let vertices = rooms(true);
         let points = [facing_point(&vertices[0])];
-        let pilot = ConnectionPilot { vertices: &vertices[..1], paths: 1, points: &points };
+        let pilot = ConnectionPilot { vertices: &vertices[..1], paths: 1, points: &points, bounds: Aabb::EMPTY };
         let one = ConnectionTables::new(&pilot, &Wall, 100);
         let clustered = one.clustered(&vertices);
         for p in [Vec3::splat(1e30), Vec3::splat(f32::NAN), Vec3::ZERO] {

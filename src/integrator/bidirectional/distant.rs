@@ -3,8 +3,9 @@
 //! Transport Simulation", Vorba et al. 2014, guides light paths by importance as well; here by trees of piecewise
 //! constant densities).
 
+use crate::geometry::SpawnPoint;
 use crate::id::LightId;
-use crate::light::Light;
+use crate::light::{EmittedRay, Light, MisCompensation};
 use crate::math::{Aabb, DVec3, Vec3};
 use crate::scene::Scene;
 
@@ -13,7 +14,7 @@ use crate::scene::Scene;
 pub struct DistantRay {
     /// The light.
     pub light: LightId,
-    /// A point of the ray.
+    /// A point of it.
     pub p: Vec3,
     /// Unit direction to the light.
     pub wi: Vec3,
@@ -54,6 +55,12 @@ struct Entry {
     cos: f32,
 }
 
+/// The axes along a face.
+#[inline(always)]
+fn face_axes(face: usize) -> [usize; 2] {
+    [(face / 2 + 1) % 3, (face / 2 + 2) % 3]
+}
+
 impl EntryBox {
     /// Where the line through a point enters that travels away from the unit direction `wi`, if it does.
     #[inline]
@@ -74,7 +81,7 @@ impl EntryBox {
         }
         let size = self.bounds.size();
         let point = p - wi * enters;
-        let [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
+        let [a, b] = face_axes(2 * axis);
         let place = |k: usize| ((point[k] - min[k]) / size[k]).clamp(0.0, 1.0);
         let at = [place(a), place(b), 0.5 + 0.5 * wi[a], 0.5 + 0.5 * wi[b]];
         Some(Entry { face: 2 * axis + usize::from(wi[axis] >= 0.0), at, cos: wi[axis].abs() })
@@ -83,7 +90,7 @@ impl EntryBox {
     /// The point where a ray enters, and the direction to its light.
     fn ray(&self, face: usize, at: RayCoordinates) -> Option<(DVec3, Vec3)> {
         let axis = face / 2;
-        let [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
+        let [a, b] = face_axes(face);
         let (mut point, mut wi) = (DVec3::ZERO, Vec3::ZERO);
         let (min, size) = (self.bounds.min.as_dvec3(), self.bounds.size().as_dvec3());
         point[axis] = f64::from(if face.is_multiple_of(2) { self.bounds.min[axis] } else { self.bounds.max[axis] });
@@ -104,7 +111,8 @@ impl EntryBox {
 
     fn face_area(&self, face: usize) -> f32 {
         let size = self.bounds.size();
-        size[(face / 2 + 1) % 3] * size[(face / 2 + 2) % 3]
+        let [a, b] = face_axes(face);
+        size[a] * size[b]
     }
 }
 
@@ -216,38 +224,28 @@ impl RayTree {
     }
 }
 
-/// Rays that enter a box by one of its faces.
+/// Rays of a light that enter a box by one of its faces.
 #[derive(Clone, Debug)]
-struct Portal {
+struct FaceRays {
     light: LightId,
     face: usize,
-    tree: RayTree,
+    density: RayTree,
 }
 
 /// Where light paths from lights at infinity start.
 #[derive(Clone, Debug)]
 pub struct DistantEmitters {
     entry_box: EntryBox,
-    portals: Vec<Portal>,
-    /// By light and face, one more than the index of the portal, or 0.
-    portal_of: Vec<[u32; 6]>,
-}
-
-/// A ray from infinity.
-pub struct DistantStart {
-    pub light: LightId,
-    /// Outside of the scene.
-    pub p: DVec3,
-    pub wi: Vec3,
-    /// Density per area perpendicular to the ray and solid angle, or per area alone from a single direction.
-    pub pdf: f32,
+    faces: Vec<FaceRays>,
+    /// By light and face, one more than the index in `faces`, or 0.
+    indices: Vec<[u32; 6]>,
 }
 
 impl DistantEmitters {
-    /// From the rays of a pilot, towards points in `bounds`, with the contributions of the portals; `None` if there are
-    /// no rays.
+    /// From the rays of a pilot that enter the box `bounds`, with what those by each face contribute; `None` if there
+    /// are no rays.
     pub fn new(scene: &Scene, rays: &[DistantRay], bounds: Aabb) -> Option<(Self, Vec<f64>)> {
-        if bounds.is_empty() {
+        if rays.is_empty() || bounds.is_empty() {
             return None;
         }
         let margin = Vec3::splat(0.01 * bounds.size().max_element());
@@ -255,63 +253,69 @@ impl DistantEmitters {
         let lights = scene.lights.lights();
         let mut emitters = Self {
             entry_box: EntryBox { bounds, scene: scene.geometry.bounds() },
-            portals: Vec::new(),
-            portal_of: vec![[0; 6]; lights.len()],
+            faces: Vec::new(),
+            indices: vec![[0; 6]; lights.len()],
         };
-        let is_known = |ray: &&DistantRay| ray.contribution > 0.0 && ray.contribution < f32::INFINITY;
-        let rays: Vec<&DistantRay> = rays.iter().filter(is_known).collect();
-        let step = rays.len().div_ceil(MAX_RAYS).max(1);
         let mean = rays.iter().map(|ray| f64::from(ray.contribution)).sum::<f64>() / rays.len() as f64;
         let limit = MAX_CONTRIBUTION * mean as f32;
-        let mut entries: Vec<((usize, usize), (RayCoordinates, f32))> = rays
+        let mut entries: Vec<((LightId, usize), (RayCoordinates, f32))> = rays
             .iter()
-            .step_by(step)
+            .step_by(rays.len().div_ceil(MAX_RAYS))
             .filter_map(|ray| {
                 let entry = emitters.entry_box.entry(ray.p, ray.wi)?;
-                Some(((ray.light.index(), entry.face), (entry.at, ray.contribution.min(limit))))
+                Some(((ray.light, entry.face), (entry.at, ray.contribution.min(limit))))
             })
             .collect();
         entries.sort_by_key(|entry| entry.0);
-        let mut weights = Vec::new();
+        let mut contributions = Vec::new();
         for of_face in entries.chunk_by(|a, b| a.0 == b.0) {
             let (light, face) = of_face[0].0;
             let mut rays: Vec<_> = of_face.iter().map(|entry| entry.1).collect();
-            let dimensions = if lights[light].is_delta() { 2 } else { 4 };
-            weights.push(rays.iter().map(|ray| f64::from(ray.1)).sum());
-            let tree = RayTree::new(&mut rays, dimensions);
-            emitters.portals.push(Portal { light: LightId::new(light), face, tree });
-            emitters.portal_of[light][face] = emitters.portals.len() as u32;
+            let dimensions = if lights[light.index()].is_delta() { 2 } else { 4 };
+            contributions.push(rays.iter().map(|ray| f64::from(ray.1)).sum());
+            emitters.faces.push(FaceRays { light, face, density: RayTree::new(&mut rays, dimensions) });
+            emitters.indices[light.index()][face] = emitters.faces.len() as u32;
         }
-        (!weights.is_empty()).then_some((emitters, weights))
+        (!contributions.is_empty()).then_some((emitters, contributions))
     }
 
-    /// A ray through a portal, from numbers in `[0, 1)`.
-    pub fn sample(&self, scene: &Scene, portal: usize, u: [f32; 4]) -> Option<DistantStart> {
-        let Portal { light, face, tree } = &self.portals[portal];
-        let (mut at, density) = tree.sample(u);
-        if let Light::Directional(distant) = scene.lights.get(*light)
-            && distant.is_delta()
-        {
-            let (wi, [a, b]) = (distant.axis(), [(face / 2 + 1) % 3, (face / 2 + 2) % 3]);
+    /// The light and a ray that enters by the face with this index, from numbers in `[0, 1)`; it starts outside of the
+    /// scene.
+    pub fn sample(&self, scene: &Scene, index: usize, u: [f32; 4]) -> Option<(LightId, EmittedRay)> {
+        let FaceRays { light, face, ref density } = self.faces[index];
+        let (mut at, density) = density.sample(u);
+        let delta = match scene.lights.get(light) {
+            Light::Directional(distant) if distant.is_delta() => Some(distant),
+            _ => None,
+        };
+        if let Some(distant) = delta {
+            let (wi, [a, b]) = (distant.axis(), face_axes(face));
             (at[2], at[3]) = (0.5 + 0.5 * wi[a], 0.5 + 0.5 * wi[b]);
         }
-        let (p, wi) = self.entry_box.ray(*face, at)?;
-        let pdf = self.pdf_of(scene, *light, *face, density, wi[face / 2].abs());
-        Some(DistantStart { light: *light, p: self.entry_box.start(p, wi), wi, pdf })
+        let (p, wi) = self.entry_box.ray(face, at)?;
+        let radiance = || scene.lights.get(light).eval_infinite(wi, MisCompensation::Off).radiance;
+        let ray = EmittedRay {
+            point: SpawnPoint { p: self.entry_box.start(p, wi), n: -wi, error: 0.0 },
+            direction: -wi,
+            radiance: delta.map_or_else(radiance, |distant| distant.irradiance()),
+            pdf_per_cos: self.pdf_of(scene, light, face, density, wi[face / 2].abs()),
+        };
+        Some((light, ray))
     }
 
-    /// The portal by which a ray towards `p` from the unit direction `wi` comes, and the density of the ray with it.
+    /// The index of the face that a ray towards `p` from the unit direction `wi` enters by, and the density of the ray:
+    /// per area perpendicular to it and solid angle, or per area alone from a single direction.
     #[inline]
     pub fn pdf(&self, scene: &Scene, light: LightId, p: Vec3, wi: Vec3) -> Option<(usize, f32)> {
         let Entry { face, at, cos } = self.entry_box.entry(p, wi)?;
-        let portal = self.portal_of[light.index()][face].checked_sub(1)? as usize;
-        let density = self.portals[portal].tree.pdf(at);
-        Some((portal, self.pdf_of(scene, light, face, density, cos)))
+        let index = self.indices[light.index()][face].checked_sub(1)? as usize;
+        let density = self.faces[index].density.pdf(at);
+        Some((index, self.pdf_of(scene, light, face, density, cos)))
     }
 
     #[inline]
     fn pdf_of(&self, scene: &Scene, light: LightId, face: usize, density: f32, cos: f32) -> f32 {
-        // Directions cover four units of the projected hemisphere's square, of area per cosine.
+        // The square around the hemisphere's projection, whose area is solid angle times cosine, has an area of 4.
         let per_direction = if scene.lights.get(light).is_delta() { 1.0 / cos } else { 0.25 };
         density * per_direction / self.entry_box.face_area(face)
     }
@@ -362,7 +366,8 @@ mod tests {
         assert!(entry_box.entry(Vec3::splat(f32::NAN), Vec3::Y).is_none());
     }
 
-    /// Chi-squared over 8 cells of each pair of coordinates: 63 degrees of freedom are above 150 once in 10^9.
+    /// Chi-squared over 8 cells of each pair of coordinates: with 63 degrees of freedom it exceeds 150 with a
+    /// probability of 6e-9.
     #[test]
     fn coordinates_have_their_density() {
         const SAMPLES: u64 = 1 << 16;
@@ -382,8 +387,7 @@ mod tests {
             for at in &samples {
                 found[cell(*at)] += 1.0;
             }
-            let volumes = leaves(&tree);
-            for (min, max, density) in &volumes {
+            for (min, max, density) in &leaves(&tree) {
                 for (i, expected) in expected.iter_mut().enumerate() {
                     let overlap = |k: usize, index: usize| {
                         let (from, to) = (index as f32 / 8.0, (index + 1) as f32 / 8.0);

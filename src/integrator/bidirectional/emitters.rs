@@ -1,11 +1,10 @@
 //! The lights where light paths start.
 
-use super::distant::{DistantEmitters, DistantRay, DistantStart};
-use crate::geometry::SpawnPoint;
+use super::distant::{DistantEmitters, DistantRay};
 use crate::id::LightId;
 use crate::integrator::PilotRecords;
-use crate::light::{EmittedRay, Light, MisCompensation};
-use crate::math::Vec3;
+use crate::light::{EmittedRay, Light};
+use crate::math::{Aabb, Vec3};
 use crate::sampling::AliasTable;
 use crate::scene::Scene;
 
@@ -13,7 +12,7 @@ use crate::scene::Scene;
 /// whose rays are chosen by what a pilot has found of them.
 #[derive(Clone, Debug)]
 pub struct Emitters {
-    /// By light, and then by portal of lights at infinity.
+    /// By light, and then by face that rays of a light at infinity enter by.
     table: AliasTable,
     lights: usize,
     distant: Option<DistantEmitters>,
@@ -22,8 +21,8 @@ pub struct Emitters {
 /// The least part of the light paths that start at surfaces, or at lights at infinity, where a scene has both.
 const LEAST_SHARE: f64 = 0.1;
 
-/// Lights at infinity start no paths where more than this part of the pilot's shadow rays is not blocked: what they
-/// shine at directly is most of the light.
+/// Lights at infinity start no paths where the pilot found more of their rays than this, by scattering: what they shine
+/// at directly is most of the light.
 const OPEN: f64 = 0.5;
 
 impl Emitters {
@@ -32,22 +31,21 @@ impl Emitters {
         Self::of_surfaces(scene).is_some() || scene.lights.lights().iter().any(Light::is_at_infinity)
     }
 
-    /// Those of a scene, if it has any, with what a pilot has found of lights at infinity.
-    pub fn new(scene: &Scene, pilot: &PilotRecords) -> Option<Self> {
+    /// Those of a scene, if it has any, with what a pilot has found of lights at infinity around the box `bounds`.
+    pub fn new(scene: &Scene, pilot: &PilotRecords, bounds: Aabb) -> Option<Self> {
         let surfaces = Self::of_surfaces(scene);
         let lights = scene.lights.lights().len();
-        let is_open = pilot.unoccluded as f64 > OPEN * pilot.shadow_rays as f64;
-        let rays: &[DistantRay] = if is_open { &[] } else { &pilot.distant_rays };
-        let distant = DistantEmitters::new(scene, rays, pilot.bounds());
+        let openness = pilot.distant_rays.len() as f64 / pilot.continuations.len() as f64;
+        tracing::debug!("pilot of light paths: {openness:.2} rays of lights at infinity by scattering");
+        let rays: &[DistantRay] = if openness > OPEN { &[] } else { &pilot.distant_rays };
         let mut weights = surfaces.clone().unwrap_or_else(|| vec![0.0; lights]);
-        let power: f64 = weights.iter().sum();
-        let distant = distant.map(|(distant, portals)| {
-            let far: f64 = portals.iter().sum();
-            let share = f64::from(pilot.distant_contribution)
-                / f64::from(pilot.distant_contribution + pilot.near_contribution).max(f64::MIN_POSITIVE);
+        let distant = DistantEmitters::new(scene, rays, bounds).map(|(distant, faces)| {
+            let far: f64 = faces.iter().sum();
+            let share = far / (far + pilot.near_contribution);
             let share = if surfaces.is_some() { share.clamp(LEAST_SHARE, 1.0 - LEAST_SHARE) } else { 1.0 };
+            let power: f64 = weights.iter().sum();
             weights.iter_mut().for_each(|weight| *weight *= (1.0 - share) / power.max(f64::MIN_POSITIVE));
-            weights.extend(portals.iter().map(|weight| share * weight / far));
+            weights.extend(faces.iter().map(|weight| share * weight / far));
             distant
         });
         Some(Self { table: AliasTable::new(&weights)?, lights, distant })
@@ -70,22 +68,14 @@ impl Emitters {
     /// normal.
     pub fn sample(&self, scene: &Scene, choice: f32, u: [f32; 2], v: [f32; 2]) -> Option<(LightId, EmittedRay)> {
         let index = self.table.sample(choice).index;
-        let pmf = self.table.pmf(index);
-        if index >= self.lights {
-            let portal = index - self.lights;
-            let start = self.distant.as_ref()?.sample(scene, portal, [u[0], u[1], v[0], v[1]])?;
-            let DistantStart { light, p, wi, pdf } = start;
-            let radiance = match scene.lights.get(light) {
-                Light::Directional(distant) if distant.is_delta() => distant.irradiance(),
-                distant => distant.eval_infinite(wi, MisCompensation::Off).radiance,
-            };
-            let point = SpawnPoint { p, n: -wi, error: 0.0 };
-            return Some((light, EmittedRay { point, direction: -wi, radiance, pdf_per_cos: pdf * pmf }));
-        }
-        let Light::Area(light) = scene.lights.get(LightId::new(index)) else { return None };
-        let ray = light.sample_emitted(&scene.geometry, u, v)?;
-        let ray = EmittedRay { pdf_per_cos: ray.pdf_per_cos * pmf, ..ray };
-        Some((LightId::new(index), ray))
+        let (id, ray) = if let Some(face) = index.checked_sub(self.lights) {
+            self.distant.as_ref()?.sample(scene, face, [u[0], u[1], v[0], v[1]])?
+        } else {
+            let id = LightId::new(index);
+            let Light::Area(light) = scene.lights.get(id) else { return None };
+            (id, light.sample_emitted(&scene.geometry, u, v)?)
+        };
+        Some((id, EmittedRay { pdf_per_cos: ray.pdf_per_cos * self.table.pmf(index), ..ray }))
     }
 
     /// The density of [`sample`](Self::sample) at a point of a surface with the unit normal `n`; 0 where no light path
@@ -104,9 +94,9 @@ impl Emitters {
     /// `wi`, per area perpendicular to it and solid angle, or per area from a single direction.
     #[inline]
     pub fn pdf_from_infinity(&self, scene: &Scene, id: LightId, p: Vec3, wi: Vec3) -> f32 {
-        let Some((portal, pdf)) = self.distant.as_ref().and_then(|distant| distant.pdf(scene, id, p, wi)) else {
+        let Some((face, pdf)) = self.distant.as_ref().and_then(|distant| distant.pdf(scene, id, p, wi)) else {
             return 0.0;
         };
-        pdf * self.table.pmf(self.lights + portal)
+        pdf * self.table.pmf(self.lights + face)
     }
 }

@@ -42,8 +42,7 @@ pub(super) struct ContinuationRecorder {
     /// By shadow ray of the wave, its light.
     lights: Vec<LightId>,
     distant_rays: Vec<DistantRay>,
-    distant_contribution: f32,
-    near_contribution: f32,
+    near_contribution: f64,
 }
 
 impl ContinuationRecorder {
@@ -90,15 +89,15 @@ impl ContinuationRecorder {
         if ray.t_max == f32::INFINITY {
             self.add_distant(id, ray, light);
         } else {
-            self.near_contribution += light.max_channel();
+            let contribution = f64::from(light.max_channel());
+            self.near_contribution += if contribution.is_finite() { contribution } else { 0.0 };
         }
     }
 
     /// Records the light of a light at infinity along a ray.
     pub fn add_distant(&mut self, light: LightId, ray: &Ray, added: Rgb) {
-        if self.is_enabled {
-            let contribution = added.max_channel();
-            self.distant_contribution += contribution;
+        let contribution = added.max_channel();
+        if self.is_enabled && contribution > 0.0 && contribution < f32::INFINITY {
             self.distant_rays.push(DistantRay { light, p: ray.origin, wi: ray.direction, contribution });
         }
     }
@@ -172,7 +171,6 @@ impl ContinuationRecorder {
         self.light_differences.resize(samples, 0.0);
         records.light_differences.append(&mut self.light_differences);
         records.distant_rays.append(&mut self.distant_rays);
-        records.distant_contribution += self.distant_contribution;
         records.near_contribution += self.near_contribution;
         *self = Self::default();
     }
