@@ -30,7 +30,7 @@ fn scene_of(shapes: &Value, materials: &Value) -> Value {
     scene
 }
 
-/// Glass, a mirror, and a rough metal that photons are gathered on.
+/// Glass, a mirror, and a rough metal.
 fn balls() -> Value {
     scene_of(
         &json!([
@@ -66,6 +66,34 @@ fn coats() -> Value {
     )
 }
 
+/// Rough metal and rough glass, beside a mirror or lit by a sun and a point light as well: photons of these would also
+/// show what the mirror throws.
+fn rough_casters(has_mirror: bool) -> Value {
+    let mut scene = scene_of(
+        &json!([
+            { "type": "quad", "material": "gold", "origin": [-1.2, 0.1, -0.6], "edge_u": [1.6, 0, 0.3],
+              "edge_v": [0, 1, -0.2] },
+            { "type": "sphere", "material": "frosted", "radius": 0.45, "transform": [{ "translate": [0.9, 0.6, 0.2] }] }
+        ]),
+        &json!({
+            "gold": { "type": "conductor", "metal": "gold", "roughness": 0.35 },
+            "frosted": { "type": "dielectric", "roughness": 0.4 }, "mirror": { "type": "mirror" }
+        }),
+    );
+    if has_mirror {
+        scene["shapes"].as_array_mut().unwrap().push(json!(
+            { "type": "quad", "material": "mirror", "origin": [-1.9, 0.1, -1], "edge_u": [0, 0, 1.5],
+              "edge_v": [0, 0.8, 0] }
+        ));
+    } else {
+        scene["lights"] = json!([
+            { "type": "directional", "direction": [-0.2, -1, -0.8], "irradiance": [1, 0.8, 0.6] },
+            { "type": "point", "position": [0.2, 1.9, 1], "intensity": [1, 1.5, 2] }
+        ]);
+    }
+    scene
+}
+
 fn of(scene: &Value, caustics: CausticsDesc, overrides: &Overrides) -> Image {
     let overrides = Overrides { caustics: Some(caustics), ..overrides.clone() };
     render_with(&prepare(scene, &overrides), AccelKind::EMBREE).image
@@ -78,7 +106,13 @@ fn of_seed(scene: &Value, caustics: CausticsDesc, seed: u64, spp: u32) -> Image 
 /// By Welch's test on blocks of pixels: wrong densities of either technique would be seen where both find the light.
 #[test]
 fn photons_and_paths_have_the_same_mean() {
-    for (what, scene) in [("balls", balls()), ("coats", coats())] {
+    let scenes = [
+        ("balls", balls()),
+        ("coats", coats()),
+        ("rough casters and a mirror", rough_casters(true)),
+        ("rough casters under delta lights", rough_casters(false)),
+    ];
+    for (what, scene) in scenes {
         let blocks = |caustics, first: u64| -> Vec<Vec<f64>> {
             (first..first + 8).map(|seed| block_means(&of_seed(&scene, caustics, seed, 64))).collect()
         };

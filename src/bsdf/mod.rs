@@ -56,6 +56,9 @@ pub use thin::{DiffuseTransmission, ThinDielectric};
 use crate::color::Rgb;
 use crate::math::Vec3;
 
+/// Microfacets up to this alpha are [near specular](Bsdf::is_near_specular).
+const NEAR_SPECULAR_ALPHA: f32 = 0.3;
+
 /// A scattered direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BsdfSample {
@@ -195,6 +198,18 @@ impl Bsdf {
     #[inline]
     pub fn flags(&self) -> BsdfFlags {
         each!(self, bsdf => bsdf.flags())
+    }
+
+    /// Whether all lobes are deltas or those of narrow microfacets: what they throw on other surfaces is a caustic.
+    pub fn is_near_specular(&self) -> bool {
+        let alpha = match self {
+            Self::Conductor(bsdf) => bsdf.alpha(),
+            Self::Dielectric(bsdf) => bsdf.alpha(),
+            Self::Beckmann(bsdf) => bsdf.narrow_alpha(),
+            Self::SeparableGgx(bsdf) => bsdf.narrow_alpha(),
+            _ => return self.flags().is_delta(),
+        };
+        alpha[0].max(alpha[1]) <= NEAR_SPECULAR_ALPHA
     }
 
     /// Whether [`sample`](Self::sample) chooses between one specular reflection and other lobes, of reflection too. It

@@ -251,8 +251,8 @@ pub enum IntegratorDesc {
         /// or photons, or in shards. Default: auto.
         #[serde(default, skip_serializing_if = "AutoDesc::is_default")]
         guiding: AutoDesc,
-        /// How caustics are found: light that mirrors and clear glass throw on other surfaces. auto is paths with fewer
-        /// than 16 samples of each pixel, and with options that photons do not support. Default: auto.
+        /// How caustics are found: light that mirrors, metal and glass throw on other surfaces. auto is paths with
+        /// fewer than 16 samples of each pixel, and with options that photons do not support. Default: auto.
         #[serde(default, skip_serializing_if = "CausticsDesc::is_default")]
         caustics: CausticsDesc,
         /// Whether paths are also connected to paths from the lights: less noise where lamps shine at walls, ceilings
@@ -381,18 +381,18 @@ pub enum StrategyDesc {
     Bsdf,
 }
 
-/// How caustics are found: light that mirrors and clear glass throw on other surfaces.
+/// How caustics are found: light that mirrors, metal and glass throw on other surfaces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CausticsDesc {
-    /// By photons too if a pilot shows that they lower the error by more than they cost. Caustics of point, spot,
-    /// projector and distant lights are missing in any case, as with `paths`.
+    /// By photons too if a pilot shows that they lower the error by more than they cost. What is missing with `paths`
+    /// is missing in any case.
     #[default]
     Auto,
-    /// By chance, where a scattered ray meets a light by way of mirrors and glass: unbiased, with much noise. Those of
-    /// point, spot, projector and distant lights are missing.
+    /// By chance, where a scattered ray meets a light by way of mirrors, metal and glass: unbiased, with much noise.
+    /// Those of point, spot, projector and distant lights by mirrors and clear glass are missing.
     Paths,
-    /// Also by photons traced from all lights: little noise. They blur caustics by up to two pixels; the blur vanishes
+    /// Also by photons traced from all lights: little noise. They blur caustics by up to 1.4 pixels; the blur vanishes
     /// as samples are added.
     Photons,
 }

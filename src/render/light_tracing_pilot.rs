@@ -41,6 +41,10 @@ const WIDESPREAD: GainBound = GainBound { left_out: 0.05, deviations: 1.0 };
 /// better spread, by which paths without connections gain more.
 const LEAST_EFFICIENCY: f64 = 1.5;
 
+/// Connections are better than photons that are worth their time as well where they gain this many times more by
+/// [`COMPARISON`], for the same reason, and since the blur of photons lowers the error as more samples do not.
+const LEAST_ADVANTAGE: f64 = 3.0;
+
 /// For which of two methods that are is better.
 const COMPARISON: GainBound = GainBound { left_out: 0.05, deviations: 2.0 };
 
@@ -71,7 +75,7 @@ pub(super) fn choose(renderer: &mut TileRenderer, workspaces: &[Mutex<TileWorksp
     if let Some(caustics) = caustics {
         let per_pilot_photon = caustics.per_pilot_photon();
         pilot.renderer.caustics = Some(caustics.for_pilot(true));
-        if pilot.efficiency(per_pilot_photon, None) > best {
+        if pilot.efficiency(per_pilot_photon, None) > best.map(|best| best / LEAST_ADVANTAGE) {
             choice = LightTracing::Photons;
         }
         renderer.caustics = renderer.caustics.take().map(|caustics| caustics.for_pilot(false));

@@ -1,16 +1,17 @@
-//! The mirrors and clear glass of a scene, where caustics start.
+//! The mirrors, metals and glass of a scene, where caustics start.
 
 use crate::bsdf::BsdfFlags;
 use crate::geometry::{Geometry, Hit, Shape, SpawnPoint, SurfacePoint};
 use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::integrator::world::has_part;
-use crate::light::{placed_area, triangle_point};
+use crate::light::{Light, placed_area, triangle_point};
+use crate::material::Material;
 use crate::math::{DVec3, Vec3};
 use crate::sampling::AliasTable;
 use crate::scene::Scene;
 
-/// Surfaces with delta lobes, chosen by area. Those that instances place are left out, as are emitters: paths find what
-/// they throw by chance.
+/// Surfaces with delta lobes or narrow ones alone, chosen by area. Those that instances place are left out, as are
+/// emitters: paths find what they throw by chance.
 #[derive(Debug)]
 pub struct CausticCasters {
     prims: Vec<(ShapeId, PrimId)>,
@@ -18,7 +19,7 @@ pub struct CausticCasters {
     table: AliasTable,
     /// By shape, one over the area of all casters; 0 for shapes that are none.
     pdf_area: Vec<f32>,
-    /// Whether photons of lights start there that paths never meet.
+    /// Whether photons of lights that paths never meet go through delta lobes first.
     pub traces_delta_lights: bool,
 }
 
@@ -37,22 +38,28 @@ impl CausticCasters {
     /// Those of a scene; `None` if it has none, if no photons can start there, or if something moves while the shutter
     /// is open.
     pub fn new(scene: &Scene, traces_delta_lights: bool) -> Option<Self> {
-        let has_lights = scene.lights.lights().iter().any(|light| traces_delta_lights || !light.is_delta());
-        if scene.features.motion || !has_lights {
+        if scene.features.motion {
             return None;
         }
+        let mut has_narrow = false;
         let (mut prims, mut areas, mut is_caster) = (Vec::new(), Vec::new(), vec![false; scene.surfaces.len()]);
         for &shape in &scene.geometry.world {
             let surface = scene.surface(shape);
             let is_specular = has_part(scene, surface.material, |part| part.flags().contains(BsdfFlags::SPECULAR));
-            if !is_specular || surface.first_light.is_some() {
+            let is_narrow = has_part(scene, surface.material, may_be_narrow);
+            if !(is_specular || is_narrow) || surface.first_light.is_some() {
                 continue;
             }
+            has_narrow |= is_narrow;
             is_caster[shape.index()] = true;
             for i in 0..scene.geometry.shape(shape).prim_count() {
                 prims.push((shape, PrimId::new(i)));
                 areas.push(area(&scene.geometry, shape, PrimId::new(i)));
             }
+        }
+        let has_photons = |light: &Light| has_narrow || traces_delta_lights || !light.is_delta();
+        if !scene.lights.lights().iter().any(has_photons) {
+            return None;
         }
         let density = 1.0 / areas.iter().sum::<f64>();
         let pdf_area = is_caster.into_iter().map(|is_caster| if is_caster { density as f32 } else { 0.0 }).collect();
@@ -87,6 +94,15 @@ impl CausticCasters {
                 CausticPoint { shape, point, pdf_area: 0.0 }
             }
         }
+    }
+}
+
+/// Whether a material may have narrow lobes alone, but not deltas.
+fn may_be_narrow(material: &Material) -> bool {
+    let flags = material.flags();
+    match material {
+        Material::Constant(bsdf) => bsdf.is_near_specular() && !flags.is_delta(),
+        _ => flags.contains(BsdfFlags::GLOSSY) && !flags.contains(BsdfFlags::DIFFUSE),
     }
 }
 

@@ -1,19 +1,23 @@
 //! Photons gathered at vertices, and the weights of paths that find the same light by chance.
 
 use super::Context;
-use super::block::{Vertices, vertex_flags};
+use super::adjoint::{self, beam_ratio};
+use super::block::{Vertices, spawn, vertex_flags};
 use super::direct::shadowing;
 use super::radiance::Output;
 use super::wave::Wave;
 use crate::color::Rgb;
-use crate::id::{InstanceId, ShapeId};
+use crate::id::{InstanceId, LightId, ShapeId};
+use crate::integrator::bidirectional::{bounded, squared};
 use crate::integrator::light_events::LightEvent;
 use crate::integrator::vertex::HemisphereTest;
 use crate::integrator::{Caustics, Photon};
+use crate::light::LightSampleContext;
+use crate::math::Vec3;
 use crate::math::rows::BATCH;
 use crate::sampling::power_heuristic;
 
-/// What is known of a path that has met nothing but delta lobes since it left a surface where photons are gathered.
+/// What is known of a path that has met nothing but narrow lobes since it left a surface where photons are gathered.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct CausticState {
     /// The density of photons there over that of the path's direction, without the density of photons at their start;
@@ -25,26 +29,12 @@ pub(super) struct CausticState {
 }
 
 impl CausticState {
-    /// Weight of light that the path has met, which `light_pdf` is the density of sampling from the last vertex.
+    /// The squared density of photons over that of light that the path has met, which `light_pdf` is the density of
+    /// sampling from the last vertex, from both sides.
     #[inline]
-    pub fn weight(&self, light_pdf: impl FnOnce() -> f32) -> f32 {
-        if self.ratio_per_light_pdf > 0.0 { power_heuristic(1.0, self.ratio_per_light_pdf * light_pdf()) } else { 1.0 }
+    pub fn of_emission(&self, light_pdf: impl FnOnce() -> f32) -> f64 {
+        if self.ratio_per_light_pdf > 0.0 { bounded(squared(self.ratio_per_light_pdf * light_pdf())) } else { 0.0 }
     }
-}
-
-/// By how much a delta lobe changes the product of solid angle and projected area of a beam, from `wo` to the sampled
-/// direction: nothing but for refraction, and for shading normals.
-pub(super) fn beam_ratio(vertices: &Vertices, lane: usize) -> f32 {
-    let shading = shading_ratio(vertices, lane);
-    shading / vertices.scatter.rr_factor[lane]
-}
-
-/// [`beam_ratio`] without refraction: the correction of shading normals for adjoint paths (Veach 1997, section 5.3).
-pub(super) fn shading_ratio(vertices: &Vertices, lane: usize) -> f32 {
-    let Vertices { rows, scatter, .. } = vertices;
-    let cos = scatter.direction.get(lane).dot(rows.n_g.get(lane));
-    let ratio = (cos * rows.wo.0[2][lane]) / (rows.cos_geometric[lane] * scatter.wi.0[2][lane]);
-    if ratio.is_finite() { ratio.abs() } else { 0.0 }
 }
 
 /// The state of the path that goes on from a vertex.
@@ -52,11 +42,24 @@ pub(super) fn after(context: &Context, vertices: &Vertices, lane: usize, state: 
     let Some(Caustics { casters, photons, .. }) = context.pass.caustics else { return state };
     let Vertices { rows, scatter, .. } = vertices;
     let cos = scatter.direction.get(lane).dot(rows.n_g.get(lane)).abs();
-    if scatter.is_delta[lane] == 0 {
+    if !adjoint::is_reversible(vertices, lane) {
+        return CausticState::default();
+    }
+    let is_delta = scatter.is_delta[lane] != 0;
+    if !is_delta && rows.flags[lane] & vertex_flags::NEAR_SPECULAR == 0 {
         let density_ratio = photons.gathered_area() * cos / scatter.pdf[lane];
         return CausticState { density_ratio, ratio_per_light_pdf: 0.0 };
     }
-    let density_ratio = state.density_ratio * beam_ratio(vertices, lane);
+    if state.density_ratio == 0.0 {
+        return state;
+    }
+    let factor = if is_delta {
+        beam_ratio(vertices, lane)
+    } else {
+        let reversed = vertices.reversed_eval(context.scene, lane, scatter.wi.get(lane)).pdf;
+        (reversed * cos / (scatter.pdf[lane] * rows.cos_geometric[lane])).abs()
+    };
+    let density_ratio = state.density_ratio * factor;
     let pdf_area = casters.pdf_area(ShapeId(rows.shape[lane]), InstanceId(rows.instance[lane]));
     let ratio = density_ratio * pdf_area / cos;
     CausticState { density_ratio, ratio_per_light_pdf: if ratio.is_finite() { ratio } else { 0.0 } }
@@ -72,7 +75,7 @@ pub(super) fn gather(context: &Context, wave: &mut Wave, block: usize, out: &mut
     for (lane, candidates) in candidates.iter_mut().enumerate().take(*count) {
         *candidates = photons.candidates(points.p.get(lane).as_vec3());
     }
-    let scatters = |lane: usize| rows.flags[lane] & (vertex_flags::DELTA | vertex_flags::MISS) == 0;
+    let scatters = |lane: usize| rows.flags[lane] & vertex_flags::UNGATHERED == 0;
     for lane in (0..(*count).min(BATCH)).filter(|&lane| !candidates[lane].is_empty() && scatters(lane)) {
         let (p, n) = (points.p.get(lane).as_vec3(), rows.n_g.get(lane));
         for photon in photons.near(candidates[lane], p, n) {
@@ -94,6 +97,36 @@ pub(super) fn gather(context: &Context, wave: &mut Wave, block: usize, out: &mut
                 };
                 out.add_to_light_aovs(context, slot, light, event, photon.light);
             }
+        }
+    }
+}
+
+/// Weighs light samples at narrow lobes against photons too.
+pub(super) fn reweigh_light_samples(context: &Context, wave: &mut Wave, block: usize) {
+    let Some(Caustics { casters, .. }) = context.pass.caustics else { return };
+    let Wave { vertices, caustics, moments, .. } = wave;
+    let lights = &context.scene.lights;
+    for lane in 0..vertices.count.min(BATCH) {
+        let Vertices { rows, light_samples, light_evals, direct, .. } = &*vertices;
+        let state = caustics[block * BATCH + vertices.path(lane)];
+        let is_narrow = rows.flags[lane] & vertex_flags::NEAR_SPECULAR != 0;
+        if !is_narrow || direct.status[lane] != spawn::SPAWNED || state.density_ratio == 0.0 {
+            continue;
+        }
+        let pdf_area = casters.pdf_area(ShapeId(rows.shape[lane]), InstanceId(rows.instance[lane]));
+        let reversed = vertices.reversed_eval(context.scene, lane, light_evals.wi.get(lane)).pdf;
+        let (light, from) = (LightId(light_samples.light[lane]), vertices.light_context(lane));
+        let [of_photons, of_paths] =
+            [Vec3::ZERO, from.n].map(|n| lights.pmf(light, &LightSampleContext { n, ..from }, context.compensation));
+        let density_ratio = state.density_ratio * pdf_area * reversed / rows.cos_geometric[lane].abs();
+        let squared_ratio = squared(density_ratio * of_photons / of_paths);
+        let pdf = light_samples.pdf[lane];
+        let weight = if light_samples.is_delta[lane] != 0 { 1.0 } else { power_heuristic(pdf, light_evals.pdf[lane]) };
+        let factor = (1.0 / (1.0 + bounded(squared_ratio * f64::from(weight)))) as f32;
+        let contribution = direct.contribution.get(lane) * factor;
+        vertices.direct.contribution.set(lane, contribution);
+        if let Some(known) = moments.photon_factors.get_mut(lane) {
+            *known = factor;
         }
     }
 }

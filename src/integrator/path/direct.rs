@@ -66,6 +66,7 @@ fn sample_once(context: &Context, regions: Option<&Regions>, wave: &mut Wave, bl
         }
         super::connection_mis::reweigh_light_samples(context, wave);
     }
+    super::caustics::reweigh_light_samples(context, wave, block);
     finish_shadow_rays(context, wave, block);
 }
 

@@ -17,27 +17,32 @@ use crate::math::{Ray, Vec3};
 use crate::sampling::power_heuristic;
 
 /// Weight of light that scattering has found, against finding it by sampling the light with density `light_pdf` from
-/// the last vertex; after a delta lobe, against photons, with the path's [`CausticState`].
+/// the last vertex, and against photons, with the path's [`CausticState`].
 #[inline(always)]
 pub(super) fn bsdf_mis_weight(
     context: &Context,
     paths: &PathRows,
     i: usize,
     caustic: Option<&CausticState>,
-    light_pdf: impl FnOnce(&LightSampleContext) -> f32,
+    light_pdf: impl Fn(&LightSampleContext) -> f32,
 ) -> f32 {
     let from = paths.from(i);
-    if paths.is_specular(i) {
-        // Photons come from both sides.
-        let from = LightSampleContext { n: Vec3::ZERO, ..from };
-        return caustic.map_or(1.0, |caustic| caustic.weight(|| light_pdf(&from)));
-    }
-    let light_pdf = || light_pdf(&from);
-    match context.config.strategy {
-        Strategy::Mis => power_heuristic(paths.pdf[i], context.last_light_samples() as f32 * light_pdf()),
+    let weight = match context.config.strategy {
+        _ if paths.is_specular(i) => 1.0,
+        Strategy::Mis => power_heuristic(paths.pdf[i], context.last_light_samples() as f32 * light_pdf(&from)),
         Strategy::Light => 0.0,
         Strategy::Bsdf => 1.0,
-    }
+    };
+    let Some(caustic) = caustic else { return weight };
+    // Photons come from both sides.
+    let from = LightSampleContext { n: Vec3::ZERO, ..from };
+    against(weight, caustic.of_emission(|| light_pdf(&from)))
+}
+
+/// A weight of the power heuristic against a further strategy, whose squared density over the weighted one's is given.
+#[inline(always)]
+pub(super) fn against(weight: f32, squared_ratio: f64) -> f32 {
+    (f64::from(weight) / (1.0 + f64::from(weight) * squared_ratio)) as f32
 }
 
 /// Adds the light of emitters at a block's vertices.
@@ -60,7 +65,7 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
             continue;
         }
         out.add(paths.slot[i], light);
-        if moments.needs_emission && paths.is_specular(i) {
+        if moments.needs_emission {
             let unweighted =
                 Met { caustic: None, ..met }.emitted(context, &at).map_or(Rgb::BLACK, |(_, radiance)| radiance);
             moments.add_emission(paths.slot[i], light, paths.throughput.get(i) * unweighted);
@@ -99,7 +104,7 @@ impl Met<'_> {
         let mut weight = bsdf_mis_weight(context, paths, *i, *caustic, light_pdf);
         if let Some(connection) = connection {
             let connections = connection.of_emission(context, id, at.n_g);
-            weight = (f64::from(weight) / (1.0 + f64::from(weight) * connections)) as f32;
+            weight = against(weight, connections);
         }
         if let Some(arrival) = departure {
             let light = light.pdf(&scene.geometry, paths.from(*i).p, ray, at);

@@ -1,7 +1,7 @@
 //! Paths from the lights, by the stages of paths from the camera.
 
+use super::adjoint::{self, AdjointScattering};
 use super::block::{Vertices, spawn, vertex_flags};
-use super::direct::shadowing;
 use super::wave::{PathRows, Wave, path_flags};
 use super::{Context, PathBuffers, PathIntegrator, materials, scatter, trace, vertices};
 use crate::color::Rgb;
@@ -10,7 +10,6 @@ use crate::id::{LightId, PrimId};
 use crate::integrator::bidirectional::{
     CONNECTIONS_PER_VERTEX, Emitters, LightVertex, PartialMis, Scattering, squared,
 };
-use crate::integrator::vertex::HemisphereTest;
 use crate::integrator::{
     CameraBatch, CameraSample, PassContext, PhotonRange, RayCounts, Workspace, cancel, dimensions,
 };
@@ -206,27 +205,17 @@ fn scatter_light(
     state: &mut LightPathState,
 ) {
     let (rows, scatter) = (&vertices.rows, &vertices.scatter);
-    let (wi, out) = (rows.wo.get(lane), scatter.wi.get(lane));
     let cos_out = scatter.direction.get(lane).dot(rows.n_g.get(lane));
     let flux = rows.throughput.get(lane);
     let is_delta = scatter.is_delta[lane] != 0;
-    let Arrived { mis, unconnected } = arrived;
-    let (next, [d_vc, unconnected_d_vc]) = if is_delta {
-        let ratio = super::caustics::shading_ratio(vertices, lane);
-        (
-            flux * scatter.weight.get(lane) * (scatter.rr_factor[lane] * ratio),
-            [mis, unconnected].map(|mis| mis.d_vc * squared(cos_out)),
-        )
-    } else {
-        let pdf = scatter.pdf[lane];
-        let toward = vertices.reversed_eval(context.scene, lane, out);
-        let test = HemisphereTest::new([wi.z, out.z], [rows.cos_geometric[lane], cos_out]);
-        let factor = shadowing::<true>(test, [rows.cos_geometric[lane], wi.z, rows.cos_normals[lane]]);
-        let weight = (cos_out / (rows.cos_geometric[lane] * pdf)).abs() * factor;
-        let d_vc = [mis, unconnected].map(|mis| squared(cos_out / pdf) * mis.sum(toward.pdf));
-        (flux * toward.value * weight, d_vc)
-    };
-    (state.d_vc, state.unconnected_d_vc) = (d_vc, unconnected_d_vc);
+    let AdjointScattering { flux: next, reversed_pdf } = adjoint::scatter(context, vertices, lane);
+    [state.d_vc, state.unconnected_d_vc] = [arrived.mis, arrived.unconnected].map(|mis| {
+        if is_delta {
+            mis.d_vc * squared(cos_out)
+        } else {
+            squared(cos_out / scatter.pdf[lane]) * mis.sum(reversed_pdf)
+        }
+    });
     let survival = (next.max_channel() / flux.max_channel()).min(1.0);
     // Paths from the camera do not find the light of delta lights behind delta lobes.
     let is_found = !(state.is_delta && is_delta && context.bounce == 0);

@@ -63,7 +63,7 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
                     );
                 }
             }
-            if moments.needs_emission && paths.is_specular(i) {
+            if moments.needs_emission {
                 let unweighted = Miss { caustic: None, ..miss }.radiance(context);
                 moments.add_emission(slot, light, paths.throughput.get(i) * unweighted);
             }
@@ -115,7 +115,7 @@ impl Miss<'_> {
         });
         if let Some(connection) = connection {
             let connections = connection.of_miss(context, id, paths.from(i).p.as_vec3(), direction);
-            weight = (f64::from(weight) / (1.0 + f64::from(weight) * connections)) as f32;
+            weight = super::emission::against(weight, connections);
         }
         radiance * weight
     }

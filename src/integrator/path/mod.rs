@@ -6,6 +6,7 @@
 //! random numbers from its own (pixel, sample, bounce), so a path is the same in any wave. "Vectorized Production Path
 //! Tracing" (Lee et al. 2017) has the idea, `docs/wavefront.md` the figures.
 
+mod adjoint;
 mod block;
 mod caustics;
 mod connection_mis;

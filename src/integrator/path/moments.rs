@@ -3,6 +3,7 @@
 use super::PassContext;
 use crate::color::Rgb;
 use crate::integrator::{EPOCH, PilotMoments};
+use crate::math::rows::BATCH;
 
 /// Moments of the samples of a batch.
 #[derive(Default)]
@@ -12,6 +13,10 @@ pub(super) struct Moments {
     /// By shadow ray, the mean of the square that a path without connections adds, over that which it adds; empty
     /// without connections.
     pub ratios: Vec<f32>,
+    /// By vertex of the block, the factor of its light sample by MIS against photons; empty where that is not wanted.
+    pub photon_factors: Vec<f32>,
+    /// The same by shadow ray.
+    pub shadow_factors: Vec<f32>,
     /// Whether the ratios are wanted.
     pub has_ratios: bool,
     /// Whether emission is wanted that is weighted against photons.
@@ -22,6 +27,10 @@ impl Moments {
     pub fn start(&mut self, pass: &PassContext, samples: usize) {
         self.has_ratios = pass.light_paths.is_some_and(|light_paths| light_paths.has_moments);
         self.needs_emission = pass.caustics.is_some_and(|caustics| caustics.has_moments);
+        self.photon_factors.clear();
+        if self.needs_emission {
+            self.photon_factors.resize(BATCH, 1.0);
+        }
         self.samples.clear();
         if self.has_ratios || self.needs_emission {
             self.samples.resize(samples, PilotMoments::default());
@@ -39,6 +48,11 @@ impl Moments {
         if let (Some(sample), Some(&ratio)) = (self.samples.get_mut(slot as usize), self.ratios.get(ray)) {
             let more = f64::from(ratio) - 1.0;
             sample.add(light, |_, square| [0.0, square * more, 0.0]);
+        }
+        if let Some(&factor) = self.shadow_factors.get(ray)
+            && factor > 0.0
+        {
+            self.add_emission(slot, light, light * (1.0 / factor));
         }
     }
 

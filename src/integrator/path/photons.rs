@@ -1,7 +1,7 @@
-//! Photons: light traced from mirrors and glass through delta lobes, by the stages of paths.
+//! Photons: light traced from mirrors, metal and glass through narrow lobes, by the stages of paths.
 
+use super::adjoint::{self, AdjointScattering, beam_ratio};
 use super::block::{Vertices, spawn, vertex_flags};
-use super::caustics::shading_ratio;
 use super::wave::Wave;
 use super::{Context, PathBuffers, PathIntegrator, materials, media, scatter, specular_direct, trace, vertices};
 use crate::color::Rgb;
@@ -24,9 +24,11 @@ pub(super) struct Source<'a> {
 /// State of a photon on its way.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PhotonState {
-    /// As in [`Photon`].
+    /// As in [`Photon`], but before the first scattering the density of light sampling.
     density: f32,
     light: LightId,
+    /// The density with which the direction to the light was chosen.
+    light_pdf: f32,
     /// Where its ray is to arrive first.
     start: CausticPoint,
 }
@@ -75,7 +77,7 @@ pub(super) fn trace(
             vertices::build_frames(&context, wave);
             wave.draw(&context);
             scatter::sample(&context, None, wave, block);
-            keep_delta_lobes(&mut wave.vertices);
+            scatter_light(&context, source, wave, block);
             survivors = wave.append(&context, block, survivors);
         }
         wave.finish_bounce(survivors);
@@ -114,14 +116,8 @@ fn emitted(context: &Context, source: &Source, index: u32) -> Option<(CameraSamp
     let cos = sample.wi.dot(start.point.n).abs();
     let light_pdf = choice.pmf * sample.pdf;
     let power = sample.radiance * (cos / (light_pdf * start.pdf_area as f32));
-    // Paths never meet a delta light: its photons have the whole weight.
-    let is_only_way = sample.is_delta;
-    if is_only_way && !source.casters.traces_delta_lights {
-        return None;
-    }
     let density = source.casters.pdf_area(start.shape, Hit::NO_INSTANCE) * light_pdf / cos;
-    let density = if is_only_way { f32::INFINITY } else { density };
-    if power.is_black() || !power.is_finite() || density.is_nan() || (density.is_infinite() && !is_only_way) {
+    if power.is_black() || !power.is_finite() || !density.is_finite() {
         return None;
     }
     let (shadow_ray, distance) = match sample.target {
@@ -136,7 +132,8 @@ fn emitted(context: &Context, source: &Source, index: u32) -> Option<(CameraSamp
     // The ray starts half-way, where nothing is in between.
     let origin = start.point.p + sample.wi.as_dvec3() * (0.5 * distance);
     let ray = Ray::new(origin.as_vec3(), -sample.wi);
-    Some((CameraSample { ray, seed, sample: index }, PhotonState { density, light: choice.id, start }, power))
+    let state = PhotonState { density, light: choice.id, light_pdf: sample.pdf, start };
+    Some((CameraSample { ray, seed, sample: index }, state, power))
 }
 
 /// Ends the photons whose ray has met something else than its start.
@@ -167,10 +164,10 @@ fn drop_evaluated(context: &Context, wave: &mut Wave, block: usize) {
     }
 }
 
-/// Stores the photons that have arrived at surfaces with other lobes than deltas.
+/// Stores the photons that have arrived at surfaces with other lobes than narrow ones.
 fn store(wave: &Wave, block: usize, scatterings: u32, photons: &mut Vec<Photon>) {
     let Vertices { rows, points, count, .. } = &wave.vertices;
-    for lane in (0..*count).filter(|&lane| rows.flags[lane] & (vertex_flags::DELTA | vertex_flags::MISS) == 0) {
+    for lane in (0..*count).filter(|&lane| rows.flags[lane] & vertex_flags::UNGATHERED == 0) {
         let PhotonState { density, light, .. } = wave.photons[block * BATCH + wave.vertices.path(lane)];
         photons.push(Photon {
             p: points.p.get(lane).as_vec3(),
@@ -184,23 +181,42 @@ fn store(wave: &Wave, block: usize, scatterings: u32, photons: &mut Vec<Photon>)
     }
 }
 
-/// Ends the photons that other lobes than deltas have scattered, and turns what paths from the camera carry into what
-/// photons carry.
-fn keep_delta_lobes(vertices: &mut Vertices) {
+/// Ends the photons that wide lobes have scattered, and turns what paths from the camera carry into what photons carry.
+fn scatter_light(context: &Context, source: &Source, wave: &mut Wave, block: usize) {
+    let Wave { vertices, photons, .. } = wave;
     for lane in 0..vertices.count {
-        let ratio = shading_ratio(vertices, lane);
-        let scatter = &mut vertices.scatter;
+        let state = &mut photons[block * BATCH + vertices.path(lane)];
+        let is_narrow = vertices.rows.flags[lane] & vertex_flags::NEAR_SPECULAR != 0;
         vertices.direct.status[lane] = spawn::NONE;
-        if scatter.is_delta[lane] == 0 || !(ratio > 0.0) {
-            scatter.status[lane] = spawn::NONE;
+        if vertices.scatter.status[lane] != spawn::SPAWNED || (vertices.scatter.is_delta[lane] == 0 && !is_narrow) {
+            vertices.scatter.status[lane] = spawn::NONE;
+            continue;
         }
-        let factor = scatter.rr_factor[lane] * ratio;
-        scatter.throughput.set(lane, scatter.throughput.get(lane) * factor);
+        let AdjointScattering { flux, reversed_pdf } = adjoint::scatter(context, vertices, lane);
+        state.density *= density_factor(context, vertices, lane, state, reversed_pdf);
+        let is_found = state.density < f32::INFINITY || source.casters.traces_delta_lights;
+        if flux.is_black() || !flux.is_finite() || !(state.density > 0.0) || !is_found {
+            vertices.scatter.status[lane] = spawn::NONE;
+        }
+        vertices.scatter.throughput.set(lane, flux);
     }
 }
 
-/// The state of the photon that goes on from a vertex.
-pub(super) fn after(vertices: &Vertices, lane: usize, state: PhotonState) -> PhotonState {
-    let ratio = vertices.scatter.rr_factor[lane] / shading_ratio(vertices, lane);
-    PhotonState { density: state.density * ratio, ..state }
+/// What scattering changes the density of photons by, over that of the paths from the camera that find the same light.
+fn density_factor(context: &Context, vertices: &Vertices, lane: usize, state: &PhotonState, reversed_pdf: f32) -> f32 {
+    let Vertices { rows, scatter, .. } = vertices;
+    let lights = &context.scene.lights;
+    // Paths never meet a delta light.
+    let is_met = context.bounce > 0 || !lights.get(state.light).is_delta();
+    if scatter.is_delta[lane] != 0 {
+        return if is_met { 1.0 / beam_ratio(vertices, lane) } else { f32::INFINITY };
+    }
+    let met = if is_met { reversed_pdf } else { 0.0 };
+    let sampled = if context.bounce == 0 && rows.flags[lane] & vertex_flags::ENCLOSED == 0 {
+        state.light_pdf * lights.pmf(state.light, &vertices.light_context(lane), context.compensation)
+    } else {
+        0.0
+    };
+    let cos_out = scatter.direction.get(lane).dot(rows.n_g.get(lane));
+    (rows.cos_geometric[lane] * scatter.pdf[lane] / (cos_out * met.hypot(sampled))).abs()
 }

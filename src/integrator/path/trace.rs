@@ -64,5 +64,6 @@ pub(super) fn shadow(context: &Context, wave: &mut Wave, out: &mut Output, count
     }
     shadows.count = 0;
     wave.moments.ratios.clear();
+    wave.moments.shadow_factors.clear();
     wave.light_aovs.shadow_sources.clear();
 }

@@ -314,6 +314,11 @@ impl Wave {
             let ratio = |lane| if scatterings > 0 { self.connection_mis.densities.moment_ratio[lane] } else { 1.0 };
             self.moments.ratios.extend((0..BATCH).filter(|&lane| lanes.contains(lane)).map(ratio));
         }
+        let Moments { photon_factors, shadow_factors, .. } = &mut self.moments;
+        shadow_factors.extend(
+            photon_factors.iter().enumerate().filter(|(lane, _)| lanes.contains(*lane)).map(|(_, factor)| *factor),
+        );
+        photon_factors.fill(1.0);
         let shadows = &mut self.shadows;
         let (to, at) = (shadows.count / BATCH, shadows.count % BATCH);
         while shadows.rays.len() < to + 2 {
@@ -373,7 +378,7 @@ impl Wave {
                 caustics[to] = super::caustics::after(context, vertices, lane, state);
             }
             if let Some(&state) = photons.get(path) {
-                photons[to] = super::photons::after(vertices, lane, state);
+                photons[to] = state;
             }
             if to < connections.len() {
                 connections[to] = connection_mis.after(lane);

@@ -278,7 +278,7 @@ pub struct RenderArgs {
     /// less noise of caustics, but biased. Off by default; 0 for off
     #[arg(long, value_name = "ALPHA", help_heading = "Algorithm")]
     pub regularize: Option<f32>,
-    /// Caustics, the light that mirrors and clear glass throw on other surfaces: auto, paths or photons
+    /// Caustics, the light that mirrors, metal and glass throw on other surfaces: auto, paths or photons
     ///
     /// Photons blur them a little, less with more samples. auto: if a pilot shows that this pays; from 16 samples on.
     /// photons: of point lights too; not with --guiding, --guide, --target-error or --regularize. Default: auto
