@@ -392,7 +392,7 @@ pub enum CausticsDesc {
     /// By chance, where a scattered ray meets a light by way of mirrors, metal and glass: unbiased, with much noise.
     /// Those of point, spot, projector and distant lights by mirrors and clear glass are missing.
     Paths,
-    /// Also by photons traced from all lights: little noise. They blur caustics by up to 1.4 pixels; the blur vanishes
+    /// Also by photons traced from all lights: little noise. They blur caustics by up to two pixels; the blur vanishes
     /// as samples are added.
     Photons,
 }

@@ -13,13 +13,13 @@ use crate::sampling::{PixelSeed, Sampler};
 use crate::scene::Scene;
 
 /// Photons traced in an epoch, by pixel of the picture.
-const PHOTONS_PER_PIXEL: f64 = 0.5;
+const PHOTONS_PER_PIXEL: f64 = 0.25;
 
 /// The fewest and the most photons traced in an epoch; the most take 600 MB.
 const PHOTONS: RangeInclusive<f64> = 16_384.0..=4e6;
 
 /// Photons are gathered within this many widths of a pixel at the median distance of what the camera sees, at first.
-const RADIUS_IN_PIXELS: f32 = 1.4;
+const RADIUS_IN_PIXELS: f32 = 2.0;
 
 /// The least radius in the first epoch, as a part of the largest coordinate: photons' points are rounded to `f32`.
 const LEAST_RADIUS: f32 = 1e-6;
