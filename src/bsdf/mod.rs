@@ -56,7 +56,7 @@ pub use thin::{DiffuseTransmission, ThinDielectric};
 use crate::color::Rgb;
 use crate::math::Vec3;
 
-/// Microfacets up to this alpha are [near specular](Bsdf::is_near_specular).
+/// The largest alpha of [near-specular](Bsdf::is_near_specular) microfacets.
 const NEAR_SPECULAR_ALPHA: f32 = 0.3;
 
 /// A scattered direction.
@@ -200,16 +200,17 @@ impl Bsdf {
         each!(self, bsdf => bsdf.flags())
     }
 
-    /// Whether all lobes are deltas or those of narrow microfacets: what they throw on other surfaces is a caustic.
+    /// Whether all lobes are those of microfacets so smooth that the light they scatter is a caustic; not for deltas.
     pub fn is_near_specular(&self) -> bool {
         let alpha = match self {
             Self::Conductor(bsdf) => bsdf.alpha(),
             Self::Dielectric(bsdf) => bsdf.alpha(),
-            Self::Beckmann(bsdf) => bsdf.narrow_alpha(),
-            Self::SeparableGgx(bsdf) => bsdf.narrow_alpha(),
-            _ => return self.flags().is_delta(),
+            Self::Beckmann(bsdf) => bsdf.specular_alpha(),
+            Self::SeparableGgx(bsdf) => bsdf.specular_alpha(),
+            _ => return false,
         };
-        alpha[0].max(alpha[1]) <= NEAR_SPECULAR_ALPHA
+        let largest = alpha[0].max(alpha[1]);
+        largest > 0.0 && largest <= NEAR_SPECULAR_ALPHA
     }
 
     /// Whether [`sample`](Self::sample) chooses between one specular reflection and other lobes, of reflection too. It

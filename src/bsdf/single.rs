@@ -40,8 +40,8 @@ impl<D: Microfacets> SingleScatteringBsdf<D> {
         each!(self, bsdf => bsdf.sample(wo, u_lobe, u))
     }
 
-    /// Alpha along both tangents of metal and glass, which have no other lobes; infinite for others.
-    pub(super) fn narrow_alpha(&self) -> [f32; 2] {
+    /// Alpha along both tangents of metal and glass, which have no diffuse base; infinite for others.
+    pub(super) fn specular_alpha(&self) -> [f32; 2] {
         match self {
             Self::Conductor(bsdf) => bsdf.alpha(),
             Self::Dielectric(bsdf) => bsdf.alpha(),

@@ -41,8 +41,9 @@ const WIDESPREAD: GainBound = GainBound { left_out: 0.05, deviations: 1.0 };
 /// better spread, by which paths without connections gain more.
 const LEAST_EFFICIENCY: f64 = 1.5;
 
-/// Connections are better than photons that are worth their time as well where they gain this many times more by
-/// [`COMPARISON`], for the same reason, and since the blur of photons lowers the error as more samples do not.
+/// Connections are chosen over photons that are worth their time too where their gain by [`COMPARISON`] is this many
+/// times as high. It is estimated too high, as above: as 4 of an interior under the sun, where 16 samples have 1.4
+/// times less error; that of photons as 1.2, where they have as much less.
 const LEAST_ADVANTAGE: f64 = 3.0;
 
 /// For which of two methods that are is better.

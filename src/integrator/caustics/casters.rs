@@ -10,8 +10,8 @@ use crate::math::{DVec3, Vec3};
 use crate::sampling::AliasTable;
 use crate::scene::Scene;
 
-/// Surfaces with delta lobes or narrow ones alone, chosen by area. Those that instances place are left out, as are
-/// emitters: paths find what they throw by chance.
+/// Surfaces with delta lobes or near-specular ones alone, chosen by area. Those that instances place are left out, as
+/// are emitters: paths find what they throw by chance.
 #[derive(Debug)]
 pub struct CausticCasters {
     prims: Vec<(ShapeId, PrimId)>,
@@ -41,23 +41,23 @@ impl CausticCasters {
         if scene.features.motion {
             return None;
         }
-        let mut has_narrow = false;
+        let mut has_near_specular = false;
         let (mut prims, mut areas, mut is_caster) = (Vec::new(), Vec::new(), vec![false; scene.surfaces.len()]);
         for &shape in &scene.geometry.world {
             let surface = scene.surface(shape);
             let is_specular = has_part(scene, surface.material, |part| part.flags().contains(BsdfFlags::SPECULAR));
-            let is_narrow = has_part(scene, surface.material, may_be_narrow);
-            if !(is_specular || is_narrow) || surface.first_light.is_some() {
+            let is_near_specular = has_part(scene, surface.material, may_be_near_specular);
+            if !(is_specular || is_near_specular) || surface.first_light.is_some() {
                 continue;
             }
-            has_narrow |= is_narrow;
+            has_near_specular |= is_near_specular;
             is_caster[shape.index()] = true;
             for i in 0..scene.geometry.shape(shape).prim_count() {
                 prims.push((shape, PrimId::new(i)));
                 areas.push(area(&scene.geometry, shape, PrimId::new(i)));
             }
         }
-        let has_photons = |light: &Light| has_narrow || traces_delta_lights || !light.is_delta();
+        let has_photons = |light: &Light| has_near_specular || traces_delta_lights || !light.is_delta();
         if !scene.lights.lights().iter().any(has_photons) {
             return None;
         }
@@ -97,11 +97,11 @@ impl CausticCasters {
     }
 }
 
-/// Whether a material may have narrow lobes alone, but not deltas.
-fn may_be_narrow(material: &Material) -> bool {
+/// Whether all lobes of a material may be near specular.
+fn may_be_near_specular(material: &Material) -> bool {
     let flags = material.flags();
     match material {
-        Material::Constant(bsdf) => bsdf.is_near_specular() && !flags.is_delta(),
+        Material::Constant(bsdf) => bsdf.is_near_specular(),
         _ => flags.contains(BsdfFlags::GLOSSY) && !flags.contains(BsdfFlags::DIFFUSE),
     }
 }

@@ -1,9 +1,9 @@
 //! Caustic photons: light that mirrors, metal and glass throw on other surfaces, traced from the lights.
 //!
 //! Paths from the camera find such light only if they happen to be scattered towards what throws it. Photons start
-//! where the light arrives at a mirror, metal or glass, follow it through delta lobes and narrow ones, and are stored
-//! where it arrives at anything else. There paths gather those that are near ("vertex merging" of Georgiev et al. 2012,
-//! for these paths alone), and multiple importance sampling weighs all ways to find the same light.
+//! where the light arrives at a mirror, metal or glass, are scattered by delta and near-specular lobes, and are stored
+//! where they arrive at anything else. There paths gather those that are near ("vertex merging" of Georgiev et al.
+//! 2012, for these paths alone), and multiple importance sampling weighs all ways to find the same light.
 //!
 //! The sample index of a path decides on the photons that it gathers: each epoch of [`EPOCH`] samples has its own,
 //! which depend on the seed and on the epoch alone. The radius shrinks from epoch to epoch, so that the blur vanishes

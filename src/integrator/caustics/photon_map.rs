@@ -9,7 +9,7 @@ use crate::id::LightId;
 use crate::math::Vec3;
 use crate::math::float::floor;
 
-/// Light that arrives at a surface after one delta or narrow lobe or more.
+/// Light that arrives at a surface after scattering by delta or near-specular lobes.
 #[derive(Clone, Copy, Debug)]
 pub struct Photon {
     /// Where.
@@ -21,13 +21,13 @@ pub struct Photon {
     /// Power times the number of photons traced.
     pub power: Rgb,
     /// Density with which photons arrive, per area and solid angle, over the cosine of `wi` and `n`; choices between
-    /// lobes left out. At narrow lobes times the density of their direction over that with which paths from the camera
-    /// find the light before them (the root of the sum of the squares of all ways). Infinite for delta lights by delta
-    /// lobes, which such paths never meet.
+    /// lobes left out. At near-specular lobes it is multiplied by the density of the photon's direction over that with
+    /// which paths from the camera find the light there (the root of the sum of the squares of all strategies).
+    /// Infinite for delta lights by delta lobes, which such paths never meet.
     pub density: f32,
     /// The light that it comes from.
     pub light: LightId,
-    /// Delta and narrow lobes on its way.
+    /// Scatterings on its way.
     pub scatterings: u32,
 }
 

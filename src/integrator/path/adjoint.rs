@@ -1,4 +1,4 @@
-//! Scattering of light on its way from a light, for paths that have come from there (Veach 1997, chapter 5).
+//! Scattering along paths that start at lights (adjoint BSDFs: Veach 1997, chapter 5).
 
 use super::Context;
 use super::block::Vertices;
@@ -6,7 +6,7 @@ use super::direct::shadowing;
 use crate::color::Rgb;
 use crate::integrator::vertex::HemisphereTest;
 
-/// What the sampled direction of a vertex means for light.
+/// How the sampled direction of a vertex scatters the flux of a path from a light.
 pub(super) struct AdjointScattering {
     /// The flux that goes on.
     pub flux: Rgb,
@@ -14,14 +14,14 @@ pub(super) struct AdjointScattering {
     pub reversed_pdf: f32,
 }
 
-/// The sampled direction and that back, as the normals see them.
+/// The test of the sampled direction and the direction back.
 fn hemisphere_test(vertices: &Vertices, lane: usize) -> HemisphereTest {
     let Vertices { rows, scatter, .. } = vertices;
     let cos = scatter.direction.get(lane).dot(rows.n_g.get(lane));
     HemisphereTest::new([rows.wo.0[2][lane], scatter.wi.0[2][lane]], [rows.cos_geometric[lane], cos])
 }
 
-/// Whether paths that come the other way are scattered in the sampled direction: not below facets.
+/// Whether a path the other way can be scattered likewise: not where the direction is below the facet.
 pub(super) fn is_reversible(vertices: &Vertices, lane: usize) -> bool {
     hemisphere_test(vertices, lane).agrees()
 }

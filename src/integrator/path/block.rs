@@ -27,7 +27,7 @@ pub(super) mod vertex_flags {
     pub const ENCLOSED: u32 = 16;
     /// Specular reflection is one of several lobes.
     pub const MIXED_SPECULAR: u32 = 32;
-    /// All lobes are narrow, but not all are deltas: photons are not gathered here, but go on.
+    /// All lobes are near specular: photons are scattered here, not gathered.
     pub const NEAR_SPECULAR: u32 = 64;
     /// Where no photons are gathered.
     pub const UNGATHERED: u32 = DELTA | MISS | NEAR_SPECULAR;

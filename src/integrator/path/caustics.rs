@@ -4,6 +4,7 @@ use super::Context;
 use super::adjoint::{self, beam_ratio};
 use super::block::{Vertices, spawn, vertex_flags};
 use super::direct::shadowing;
+use super::emission;
 use super::radiance::Output;
 use super::wave::Wave;
 use crate::color::Rgb;
@@ -17,7 +18,8 @@ use crate::math::Vec3;
 use crate::math::rows::BATCH;
 use crate::sampling::power_heuristic;
 
-/// What is known of a path that has met nothing but narrow lobes since it left a surface where photons are gathered.
+/// What is known of a path that was scattered by delta and near-specular lobes alone since it left a surface where
+/// photons are gathered.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct CausticState {
     /// The density of photons there over that of the path's direction, without the density of photons at their start;
@@ -101,7 +103,7 @@ pub(super) fn gather(context: &Context, wave: &mut Wave, block: usize, out: &mut
     }
 }
 
-/// Weighs light samples at narrow lobes against photons too.
+/// Weighs light samples at near-specular surfaces against photons too.
 pub(super) fn reweigh_light_samples(context: &Context, wave: &mut Wave, block: usize) {
     let Some(Caustics { casters, .. }) = context.pass.caustics else { return };
     let Wave { vertices, caustics, moments, .. } = wave;
@@ -109,8 +111,8 @@ pub(super) fn reweigh_light_samples(context: &Context, wave: &mut Wave, block: u
     for lane in 0..vertices.count.min(BATCH) {
         let Vertices { rows, light_samples, light_evals, direct, .. } = &*vertices;
         let state = caustics[block * BATCH + vertices.path(lane)];
-        let is_narrow = rows.flags[lane] & vertex_flags::NEAR_SPECULAR != 0;
-        if !is_narrow || direct.status[lane] != spawn::SPAWNED || state.density_ratio == 0.0 {
+        let is_near_specular = rows.flags[lane] & vertex_flags::NEAR_SPECULAR != 0;
+        if !is_near_specular || direct.status[lane] != spawn::SPAWNED || state.density_ratio == 0.0 {
             continue;
         }
         let pdf_area = casters.pdf_area(ShapeId(rows.shape[lane]), InstanceId(rows.instance[lane]));
@@ -122,7 +124,7 @@ pub(super) fn reweigh_light_samples(context: &Context, wave: &mut Wave, block: u
         let squared_ratio = squared(density_ratio * of_photons / of_paths);
         let pdf = light_samples.pdf[lane];
         let weight = if light_samples.is_delta[lane] != 0 { 1.0 } else { power_heuristic(pdf, light_evals.pdf[lane]) };
-        let factor = (1.0 / (1.0 + bounded(squared_ratio * f64::from(weight)))) as f32;
+        let factor = emission::share_against(weight, squared_ratio) as f32;
         let contribution = direct.contribution.get(lane) * factor;
         vertices.direct.contribution.set(lane, contribution);
         if let Some(known) = moments.photon_factors.get_mut(lane) {

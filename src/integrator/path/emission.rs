@@ -10,6 +10,7 @@ use crate::color::Rgb;
 use crate::geometry::SurfaceInteraction;
 use crate::id::LightId;
 use crate::integrator::Strategy;
+use crate::integrator::bidirectional::bounded;
 use crate::integrator::light_events::LightEvent;
 use crate::light::{Light, LightSampleContext};
 use crate::math::rows::BATCH;
@@ -39,10 +40,17 @@ pub(super) fn bsdf_mis_weight(
     against(weight, caustic.of_emission(|| light_pdf(&from)))
 }
 
-/// A weight of the power heuristic against a further strategy, whose squared density over the weighted one's is given.
+/// A weight of the power heuristic against a further strategy too, whose squared density over the weighted one's is
+/// given.
 #[inline(always)]
 pub(super) fn against(weight: f32, squared_ratio: f64) -> f32 {
-    (f64::from(weight) / (1.0 + f64::from(weight) * squared_ratio)) as f32
+    (f64::from(weight) * share_against(weight, squared_ratio)) as f32
+}
+
+/// What a further strategy leaves of a weight, as in [`against`].
+#[inline(always)]
+pub(super) fn share_against(weight: f32, squared_ratio: f64) -> f64 {
+    1.0 / (1.0 + bounded(f64::from(weight) * squared_ratio))
 }
 
 /// Adds the light of emitters at a block's vertices.

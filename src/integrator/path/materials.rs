@@ -214,8 +214,7 @@ fn flags(bsdf: &Bsdf) -> u32 {
     let delta = if lobes.is_delta() { vertex_flags::DELTA } else { 0 };
     let transmits = if lobes.transmits() { vertex_flags::TRANSMITS } else { 0 };
     let is_mixed = lobes.contains(BsdfFlags::SPECULAR) && bsdf.has_mixed_specular_reflection();
-    let is_near_specular = delta == 0 && bsdf.is_near_specular();
-    let near_specular = if is_near_specular { vertex_flags::NEAR_SPECULAR } else { 0 };
+    let near_specular = if bsdf.is_near_specular() { vertex_flags::NEAR_SPECULAR } else { 0 };
     delta | transmits | near_specular | if is_mixed { vertex_flags::MIXED_SPECULAR } else { 0 }
 }
 

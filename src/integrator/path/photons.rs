@@ -1,4 +1,4 @@
-//! Photons: light traced from mirrors, metal and glass through narrow lobes, by the stages of paths.
+//! Photons: light traced from mirrors, metal and glass by delta and near-specular lobes, by the stages of paths.
 
 use super::adjoint::{self, AdjointScattering, beam_ratio};
 use super::block::{Vertices, spawn, vertex_flags};
@@ -164,7 +164,7 @@ fn drop_evaluated(context: &Context, wave: &mut Wave, block: usize) {
     }
 }
 
-/// Stores the photons that have arrived at surfaces with other lobes than narrow ones.
+/// Stores the photons that have arrived at surfaces where they are gathered.
 fn store(wave: &Wave, block: usize, scatterings: u32, photons: &mut Vec<Photon>) {
     let Vertices { rows, points, count, .. } = &wave.vertices;
     for lane in (0..*count).filter(|&lane| rows.flags[lane] & vertex_flags::UNGATHERED == 0) {
@@ -181,21 +181,22 @@ fn store(wave: &Wave, block: usize, scatterings: u32, photons: &mut Vec<Photon>)
     }
 }
 
-/// Ends the photons that wide lobes have scattered, and turns what paths from the camera carry into what photons carry.
+/// Scatters photons, but for those by other lobes than deltas and near-specular ones, which end.
 fn scatter_light(context: &Context, source: &Source, wave: &mut Wave, block: usize) {
     let Wave { vertices, photons, .. } = wave;
     for lane in 0..vertices.count {
         let state = &mut photons[block * BATCH + vertices.path(lane)];
-        let is_narrow = vertices.rows.flags[lane] & vertex_flags::NEAR_SPECULAR != 0;
+        let is_near_specular = vertices.rows.flags[lane] & vertex_flags::NEAR_SPECULAR != 0;
+        let is_kept = vertices.scatter.is_delta[lane] != 0 || is_near_specular;
         vertices.direct.status[lane] = spawn::NONE;
-        if vertices.scatter.status[lane] != spawn::SPAWNED || (vertices.scatter.is_delta[lane] == 0 && !is_narrow) {
+        if vertices.scatter.status[lane] != spawn::SPAWNED || !is_kept {
             vertices.scatter.status[lane] = spawn::NONE;
             continue;
         }
         let AdjointScattering { flux, reversed_pdf } = adjoint::scatter(context, vertices, lane);
         state.density *= density_factor(context, vertices, lane, state, reversed_pdf);
-        let is_found = state.density < f32::INFINITY || source.casters.traces_delta_lights;
-        if flux.is_black() || !flux.is_finite() || !(state.density > 0.0) || !is_found {
+        let is_wanted = state.density < f32::INFINITY || source.casters.traces_delta_lights;
+        if flux.is_black() || !flux.is_finite() || !(state.density > 0.0) || !is_wanted {
             vertices.scatter.status[lane] = spawn::NONE;
         }
         vertices.scatter.throughput.set(lane, flux);
