@@ -233,16 +233,16 @@ impl ContinuationGrid {
     /// The roots at the first `count` points, whose normals are turned to the side on which `cos_side` is positive.
     pub(super) fn find(&self, points: &DVec3Rows, normals: &Vec3Rows, cos_side: &Row, roots: &mut Row, count: usize) {
         let mut cells = [0; BATCH];
-        vectorize!(find_cells(self, points, normals, cos_side, &mut cells));
-        for (root, &cell) in roots.iter_mut().zip(&cells).take(count) {
+        vectorize!(find_cells(self, points, normals, cos_side, &mut cells[..count]));
+        for (root, &cell) in roots.iter_mut().zip(&cells[..count]) {
             *root = self.roots[cell as usize];
         }
     }
 }
 
 #[inline(always)]
-fn find_cells(grid: &ContinuationGrid, points: &DVec3Rows, normals: &Vec3Rows, cos_side: &Row, cells: &mut Row<u32>) {
-    for (i, cell) in cells.iter_mut().enumerate() {
+fn find_cells(grid: &ContinuationGrid, points: &DVec3Rows, normals: &Vec3Rows, cos_side: &Row, cells: &mut [u32]) {
+    for (i, cell) in cells.iter_mut().enumerate().take(BATCH) {
         let n = normals.get(i) * 1f32.copysign(cos_side[i]);
         *cell = grid.cells.cell(points.get(i).as_vec3(), n);
     }

@@ -13,6 +13,8 @@ const WIDTH: usize = 16;
 #[derive(Clone, Copy, Debug)]
 pub struct Compaction {
     masks: [u16; BATCH / WIDTH],
+    /// The masks up to the last that may have a bit: blocks are often nearly empty after many bounces.
+    used: usize,
     count: usize,
     instructions: Instructions,
 }
@@ -147,13 +149,15 @@ impl Compaction {
     #[inline(always)]
     fn new(flags: &Row<u32>, count: usize, is_chosen: impl Fn(u32) -> bool) -> Self {
         let mut masks = [0u16; BATCH / WIDTH];
-        for (i, (mask, flags)) in masks.iter_mut().zip(flags.as_chunks::<WIDTH>().0).enumerate() {
+        let used = count.div_ceil(WIDTH).min(masks.len());
+        for (i, (mask, flags)) in masks[..used].iter_mut().zip(flags.as_chunks::<WIDTH>().0).enumerate() {
             let chosen = (0..).zip(flags).fold(0, |bits, (lane, &flag)| bits | u32::from(is_chosen(flag)) << lane);
             let within = count.saturating_sub(i * WIDTH).min(WIDTH);
             *mask = (chosen & ((1 << within) - 1)) as u16;
         }
         Self {
             masks,
+            used,
             count: masks.iter().map(|mask| mask.count_ones() as usize).sum(),
             instructions: Instructions::detect(),
         }
@@ -231,7 +235,7 @@ impl Compaction {
         mut next: Option<&mut Row<T>>,
         mut at: usize,
     ) {
-        for (&bits, numbers) in self.masks.iter().zip(from.as_chunks::<WIDTH>().0) {
+        for (&bits, numbers) in self.masks[..self.used.min(BATCH / WIDTH)].iter().zip(from.as_chunks::<WIDTH>().0) {
             let count = bits.count_ones() as usize;
             // Of a length that the compiler knows: else each is a call.
             let whole = if at < BATCH {
