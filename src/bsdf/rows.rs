@@ -268,7 +268,7 @@ impl Bsdf {
             return out.set(0, &single(0));
         }
         lanes!(self, varies.then_some(queries), bsdfs => {
-            let count = whole_vectors(count);
+            let count = machine_vectors(count);
             vectorize!(eval(&bsdfs, queries, out, count))
         }, {
             (0..count.min(BATCH)).for_each(|i| out.set(i, &single(i)));
@@ -282,7 +282,7 @@ impl Bsdf {
             return out.set(0, single(0));
         }
         lanes!(self, varies.then_some(queries), bsdfs => {
-            let count = whole_vectors(count);
+            let count = machine_vectors(count);
             vectorize!(sample(&bsdfs, queries, out, count))
         }, {
             (0..count.min(BATCH)).for_each(|i| out.set(i, single(i)));
@@ -290,8 +290,8 @@ impl Bsdf {
     }
 }
 
-/// The count rounded up to whole vectors: what is computed for lanes beyond it is not used.
-fn whole_vectors(count: usize) -> usize {
+/// As [`whole_vectors`](crate::math::rows::whole_vectors), of the machine: groups are small, and lanes take long.
+fn machine_vectors(count: usize) -> usize {
     count.next_multiple_of(vectorize::lanes()).min(BATCH)
 }
 

@@ -1,7 +1,7 @@
 //! Rays through many points of the film at once.
 
 use super::{Camera, Projection};
-use crate::math::rows::{BATCH, Row, pair};
+use crate::math::rows::{Row, pair, whole_vectors};
 use crate::math::vectorize::vectorize;
 use crate::math::{RayRows, Vec2};
 
@@ -30,7 +30,7 @@ struct Picture {
 
 #[inline(always)]
 fn pinhole_rays(camera: &Camera, picture: Picture, film: &[Row; 2], rays: &mut RayRows, count: usize) {
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let toward = camera.on_picture(Vec2::from(pair(film, i)), picture.size, picture.half_height);
         let start = camera.pinhole_start(toward);
         rays.origin.set(i, camera.world_from_camera.point(start).as_vec3());

@@ -3,7 +3,7 @@
 
 use super::directions::{Cell, CurvePoint, DirectionDistribution, LightPoint, SearchTree};
 use crate::math::Vec3;
-use crate::math::rows::{BATCH, Row, Vec3Rows, soa};
+use crate::math::rows::{BATCH, Row, Vec3Rows, soa, whole_vectors};
 use crate::math::vectorize::vectorize;
 
 /// The distribution to look up in each lane, if any.
@@ -69,7 +69,7 @@ impl DirectionLookups {
 
 #[inline(always)]
 fn find_curve_points(directions: &Vec3Rows, rows: &mut LookupRows, count: usize) {
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let point = CurvePoint::of(directions.get(i));
         (rows.number[i], rows.per_angle[i]) = (point.place, point.per_angle);
     }
@@ -77,7 +77,7 @@ fn find_curve_points(directions: &Vec3Rows, rows: &mut LookupRows, count: usize)
 
 #[inline(always)]
 fn find_light_points(u: &Row, rows: &mut LookupRows, count: usize) {
-    for (i, &u) in u.iter().enumerate().take(count) {
+    for (i, &u) in u.iter().enumerate().take(whole_vectors(count)) {
         let point = LightPoint::of(u);
         (rows.number[i], rows.fraction[i]) = (point.light, point.fraction);
     }
@@ -109,7 +109,7 @@ fn cell(rows: &LookupRows, i: usize) -> Cell {
 
 #[inline(always)]
 fn find_densities(rows: &LookupRows, pdf: &mut Row, count: usize) {
-    for (i, pdf) in pdf.iter_mut().enumerate().take(count) {
+    for (i, pdf) in pdf.iter_mut().enumerate().take(whole_vectors(count)) {
         let density = cell(rows, i).density();
         // Directions that are not looked up may have no density per angle.
         *pdf = if density > 0.0 { density * rows.per_angle[i] } else { 0.0 };
@@ -118,7 +118,7 @@ fn find_densities(rows: &LookupRows, pdf: &mut Row, count: usize) {
 
 #[inline(always)]
 fn place_samples(rows: &mut LookupRows, v: &Row, directions: &mut Vec3Rows, count: usize) {
-    for (i, &v) in v.iter().enumerate().take(count) {
+    for (i, &v) in v.iter().enumerate().take(whole_vectors(count)) {
         let point = LightPoint { light: rows.number[i], fraction: rows.fraction[i] };
         let (direction, per_angle) = cell(rows, i).direction(point, v);
         directions.set(i, direction);

@@ -9,7 +9,7 @@ use crate::id::{MaterialId, ShapeId};
 use crate::light::{Light, MisCompensation};
 use crate::material::Material;
 use crate::math::float::step_past;
-use crate::math::rows::BATCH;
+use crate::math::rows::whole_vectors;
 use crate::math::vectorize::vectorize;
 use crate::math::{Aabb, Ray, RayRows, Vec3};
 use crate::scene::{Scene, Surface};
@@ -195,7 +195,7 @@ impl<'a> World<'a> {
 #[inline(always)]
 fn clip_to_scene(bounds: Aabb, reach_squared: f32, rays: &mut RayRows, count: usize) {
     let extent = bounds.size().max_element();
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let origin = rays.origin.get(i);
         let nearest = origin.max(bounds.min).min(bounds.max);
         let gap_squared = (nearest - origin).length_squared();

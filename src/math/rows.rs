@@ -5,6 +5,17 @@ use super::{DVec3, Vec2, Vec3};
 /// Lanes of a row: few enough that rows stay in the nearest caches.
 pub const BATCH: usize = 128;
 
+/// Lanes of the widest vectors.
+const WIDTH: usize = 16;
+
+/// The first `count` lanes and those after them in the last vector, at most [`BATCH`]. Loops over whole vectors leave no
+/// lanes to be computed one by one; what they compute beyond the count is not used.
+#[inline(always)]
+pub fn whole_vectors(count: usize) -> usize {
+    // The compiler sees that it is a multiple.
+    count.min(BATCH).div_ceil(WIDTH) * WIDTH
+}
+
 /// One number per lane.
 pub type Row<T = f32> = [T; BATCH];
 

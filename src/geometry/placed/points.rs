@@ -3,7 +3,7 @@
 use super::{Analytic, CenteredRay, LocalHit, TransformedShape};
 use crate::geometry::{Detail, Disk, Frustum, LocalSurface, Quad, ShapeSample, Sphere};
 use crate::math::float::UNIT_ROUNDOFF;
-use crate::math::rows::{BATCH, Element, Row, pair, soa};
+use crate::math::rows::{BATCH, Element, Row, pair, soa, whole_vectors};
 use crate::math::vectorize::vectorize;
 use crate::math::{DVec3, Ray, RayF64, RayRows, Vec2, Vec3};
 
@@ -65,7 +65,7 @@ fn sample_on<S: LaneShape, const FULL: bool>(
     count: usize,
     out: &mut WorldSampleRows,
 ) {
-    for i in 0..count.next_multiple_of(16).min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let sample = shape.sample::<FULL>(pair(u, i).map(f64::from));
         let point = placed.place(sample.p, sample.n, sample.pdf_area);
         out.p.set(i, point.p);
@@ -134,7 +134,7 @@ fn resolve_on<S: LaneShape>(
     points: &mut WorldPointRows,
     normals: &mut WorldNormalRows,
 ) {
-    for i in 0..count.next_multiple_of(16).min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let ray = Ray { t_min: rays.t_min[i], ..Ray::new(rays.origin.get(i), rays.direction.get(i)) };
         let CenteredRay { ray: local, shift } = placed.centered_ray(&ray);
         let distance = shape.distance(&local);

@@ -9,7 +9,7 @@ use crate::integrator::bidirectional::{CONNECTIONS_PER_VERTEX, LightPaths, Parti
 use crate::integrator::vertex::HemisphereTest;
 use crate::light::{LightSampleRows, light_target};
 use crate::math::Vec3;
-use crate::math::rows::{BATCH, Row, soa};
+use crate::math::rows::{BATCH, Row, soa, whole_vectors};
 use crate::math::vectorize::vectorize;
 
 /// What a path from the camera remembers of other strategies.
@@ -110,7 +110,7 @@ pub(super) fn arrive(wave: &mut Wave, block: usize) {
 
 #[inline(always)]
 fn find_arrived(rows: &VertexRows, densities: &DensityRows, mis: &mut MisRows, count: usize) {
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let cos = squared(rows.cos_geometric[i]);
         mis.d_vcm[i] = squared(rows.t[i] * rows.t[i] / densities.arrived[i]) / cos;
         mis.d_vc[i] /= cos;
@@ -130,7 +130,7 @@ pub(super) fn leave(context: &Context, wave: &mut Wave) {
 #[inline(always)]
 fn find_next(vertices: &Vertices, densities: &mut DensityRows, mis: &mut MisRows) {
     let Vertices { count, rows, scatter, .. } = vertices;
-    for i in 0..(*count).min(BATCH) {
+    for i in 0..whole_vectors(*count) {
         let cos = scatter.direction.get(i).dot(rows.n_g.get(i));
         let is_delta = scatter.is_delta[i] != 0;
         let test = HemisphereTest::new([rows.wo.0[2][i], scatter.wi.0[2][i]], [rows.cos_geometric[i], cos]);
@@ -185,7 +185,7 @@ struct LightWeights<'a> {
 #[inline(always)]
 fn reweigh(lights: &LightWeights, contribution: &mut [Row; 3], count: usize) {
     let LightWeights { rows, light_samples, light_evals, densities, mis, samples } = *lights;
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let cos = light_samples.direction.get(i).dot(rows.n_g.get(i));
         let pdf = squared(light_samples.pdf[i] * samples);
         let partial = PartialMis { d_vcm: mis.d_vcm[i], d_vc: mis.d_vc[i] };

@@ -18,7 +18,7 @@ use crate::integrator::vertex::HemisphereTest;
 use crate::light::LightSampleRows;
 use crate::math::Vec3;
 use crate::math::prefetch::prefetch;
-use crate::math::rows::{BATCH, soa};
+use crate::math::rows::{BATCH, soa, whole_vectors};
 use crate::math::vectorize::vectorize;
 
 soa! {
@@ -192,7 +192,7 @@ fn choose_connected(
 /// Finds the directions to the chosen vertices, and how these scatter light if they are diffuse.
 #[inline(always)]
 fn find_directions(points: &PointRows, lights: &mut LightSampleRows, ends: &mut LightVertexRows, count: usize) {
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let toward = (points.target_p.get(i) - points.p.get(i)).as_vec3();
         let distance_squared = toward.length_squared();
         let is_apart = distance_squared > 0.0;
@@ -237,7 +237,7 @@ struct Pairs<'a> {
 #[inline(always)]
 fn connect<const PERTURBED: bool>(pairs: &Pairs, densities: &mut DensityRows, direct: &mut DirectRows, count: usize) {
     let Pairs { rows, points, lights, evals, ends, mis, per_path } = *pairs;
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let direction = lights.direction.get(i);
         let cos_local = evals.wi.0[2][i];
         let cos = direction.dot(rows.n_g.get(i));
@@ -276,7 +276,7 @@ fn connect<const PERTURBED: bool>(pairs: &Pairs, densities: &mut DensityRows, di
 #[inline(always)]
 fn find_moments(pairs: &Pairs, densities: &mut DensityRows, direct: &DirectRows, count: usize) {
     let Pairs { evals, ends, mis, lights, .. } = *pairs;
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let cos_light = lights.direction.get(i).dot(ends.n.get(i));
         let unconnected = PartialMis { d_vcm: mis.unconnected_d_vcm[i], d_vc: mis.unconnected_d_vc[i] };
         let density =
@@ -292,7 +292,7 @@ fn find_moments(pairs: &Pairs, densities: &mut DensityRows, direct: &DirectRows,
 /// Takes what roulette has multiplied squares by out of their ratios.
 #[inline(always)]
 fn divide_moments(densities: &mut DensityRows, direct: &DirectRows, count: usize) {
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         densities.moment_ratio[i] /= direct.contribution.get(i).max_channel();
     }
 }

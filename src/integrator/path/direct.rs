@@ -12,7 +12,7 @@ use crate::integrator::vertex::HemisphereTest;
 use crate::integrator::{ContinuationGrid, Strategy};
 use crate::light::{LightContext, LightQueries, LightQueue, LightSampleRows, light_target};
 use crate::math::Vec3;
-use crate::math::rows::BATCH;
+use crate::math::rows::{BATCH, whole_vectors};
 use crate::math::vectorize::vectorize;
 use crate::sampling::{SampleRows, power_heuristic};
 
@@ -150,7 +150,7 @@ fn illuminate<const PERTURBED: bool>(
     weighting: Weighting,
     count: usize,
 ) {
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let direction = lights.direction.get(i);
         let cos = direction.dot(rows.n_g.get(i));
         let cos_local = evals.wi.0[2][i];
@@ -197,7 +197,7 @@ fn play_roulette(
     u_bsdf: &SampleRows,
     count: usize,
 ) {
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let contribution = direct.contribution.get(i);
         let probability = grid.shadow_ray_probability(contribution.max_channel(), rows.rr_scale[i]);
         // The number of the path's own roulette, reversed: the two decisions are anticorrelated.

@@ -5,7 +5,7 @@ use super::materials::BsdfTable;
 use super::wave::BsdfScratch;
 use crate::bsdf::{BsdfEvalRows, Lambert};
 use crate::math::Frame;
-use crate::math::rows::{BATCH, Row, Vec3Rows};
+use crate::math::rows::{Row, Vec3Rows, whole_vectors};
 use crate::math::vectorize::vectorize;
 use crate::scene::Scene;
 
@@ -91,7 +91,7 @@ impl Surfaces<'_> {
 
 #[inline(always)]
 fn eval_diffuse(rows: &VertexRows, directions: &Vec3Rows, evals: &mut EvalRows, count: usize) {
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let frame = Frame { x: rows.frame_x.get(i), y: rows.frame_y.get(i), z: rows.n.get(i) };
         let wi = frame.to_local(directions.get(i));
         let eval = Lambert { albedo: rows.albedo.get(i) }.eval(rows.wo.get(i), wi);
@@ -103,7 +103,7 @@ fn eval_diffuse(rows: &VertexRows, directions: &Vec3Rows, evals: &mut EvalRows, 
 
 #[inline(always)]
 fn reversed_diffuse_pdfs(rows: &VertexRows, wi: &Vec3Rows, pdfs: &mut Row, count: usize) {
-    for (i, pdf) in pdfs.iter_mut().enumerate().take(count.min(BATCH)) {
+    for (i, pdf) in pdfs.iter_mut().enumerate().take(whole_vectors(count)) {
         *pdf = Lambert { albedo: rows.albedo.get(i) }.eval(wi.get(i), rows.wo.get(i)).pdf;
     }
 }

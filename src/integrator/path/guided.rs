@@ -12,7 +12,7 @@ use crate::guiding::{DirectionLookups, Distributions, Guide, GuideSampleRows, Re
 use crate::integrator::SecondMoments;
 use crate::light::light_target;
 use crate::math::float::ONE_MINUS_EPSILON;
-use crate::math::rows::{BATCH, Row, Vec3Rows, soa};
+use crate::math::rows::{BATCH, Row, Vec3Rows, soa, whole_vectors};
 use crate::math::vectorize::vectorize;
 use crate::math::{Frame, Vec3};
 use crate::sampling::SampleRows;
@@ -277,7 +277,7 @@ fn rescale_choices(bsdf_sampling_fraction: &Row, u: &mut SampleRows) {
 
 #[inline(always)]
 fn find_bsdf_directions(rows: &VertexRows, scatter: &ScatterRows, directions: &mut Vec3Rows, count: usize) {
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let frame = Frame { x: rows.frame_x.get(i), y: rows.frame_y.get(i), z: rows.n.get(i) };
         directions.set(i, frame.to_world(scatter.wi.get(i)));
     }

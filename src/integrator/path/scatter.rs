@@ -12,7 +12,7 @@ use crate::geometry::SpawnPoint;
 use crate::integrator::roulette::{Roulette, SurvivalRule};
 use crate::integrator::vertex::HemisphereTest;
 use crate::math::Frame;
-use crate::math::rows::BATCH;
+use crate::math::rows::{BATCH, whole_vectors};
 use crate::math::vectorize::vectorize;
 use crate::sampling::SampleRows;
 
@@ -92,7 +92,7 @@ fn sample_non_diffuse(context: &Context, vertices: &mut Vertices, rows: &mut Bsd
 
 #[inline(always)]
 fn sample_diffuse(rows: &VertexRows, scatter: &mut ScatterRows, u: &SampleRows, count: usize) {
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let lambert = Lambert { albedo: rows.albedo.get(i) };
         let [_, u, v, _] = u.of(i);
         let sample = lambert.direction(rows.wo.get(i), [u, v]);
@@ -124,7 +124,7 @@ fn spawn_rays<const PERTURBED: bool>(
     rule: SpawnRule,
     count: usize,
 ) {
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let frame = Frame { x: rows.frame_x.get(i), y: rows.frame_y.get(i), z: rows.n.get(i) };
         let wi = scatter.wi.get(i);
         let direction = frame.to_world(wi);

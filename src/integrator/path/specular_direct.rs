@@ -14,7 +14,7 @@ use crate::color::Rgb;
 use crate::geometry::{SpawnPoint, SurfaceInteraction};
 use crate::id::LightId;
 use crate::light::{Light, light_target};
-use crate::math::rows::{BATCH, Row, soa};
+use crate::math::rows::{Row, soa, whole_vectors};
 use crate::math::vectorize::vectorize;
 use crate::math::{Frame, Ray, Vec3};
 
@@ -115,13 +115,13 @@ fn sample_reflections(
 #[inline(always)]
 fn aim(emitters: &EmitterPrims, vertices: &Vertices, found: &mut SpecularRows, count: usize) {
     let Vertices { rows, points, light_evals: evals, .. } = vertices;
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let frame = Frame { x: rows.frame_x.get(i), y: rows.frame_y.get(i), z: rows.n.get(i) };
         found.direction.set(i, frame.to_world(evals.wi.get(i)));
         found.candidates[i] = 0;
     }
     for (bit, around) in emitters.boxes().enumerate() {
-        for i in 0..count.min(BATCH) {
+        for i in 0..whole_vectors(count) {
             let is_near = around.may_be_met(points.p.get(i).as_vec3(), found.direction.get(i));
             found.candidates[i] |= (u32::from(is_near) & found.has_reflection[i]) << bit;
         }

@@ -9,7 +9,7 @@ use crate::geometry::{Hit, Shape, TrianglePoints, interpolated_normal, interpola
 use crate::id::ShapeId;
 use crate::integrator::shading::{adapted_normal, is_consistent};
 use crate::math::compact::{Compaction, collect_lanes, sort_lanes};
-use crate::math::rows::{BATCH, Element, Row, Vec3Rows};
+use crate::math::rows::{BATCH, Element, Row, Vec3Rows, whole_vectors};
 use crate::math::vectorize::vectorize;
 use crate::math::{Frame, Ray, RayRows, Vec2};
 
@@ -194,7 +194,7 @@ fn intersect_triangles<const SMOOTH: bool, const UV: bool>(
     points: &mut PointRows,
     count: usize,
 ) {
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let corners = TrianglePoints { a: triangles.a.get(i), b: triangles.b.get(i), c: triangles.c.get(i) };
         let hit = corners.intersect_plane(triangles.origin.get(i), rows.direction.get(i));
         points.p.set(i, hit.p);
@@ -253,7 +253,7 @@ pub(super) fn build_frames(context: &Context, wave: &mut Wave) {
 /// Takes the shading normals that reflect nothing below the surface.
 #[inline(always)]
 fn adapt_normals(rows: &mut VertexRows, count: usize) {
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let n_s = rows.n_s.get(i);
         rows.is_consistent[i] = u32::from(is_consistent(-rows.direction.get(i), n_s, rows.n_g.get(i)));
         rows.n.set(i, n_s);
@@ -262,7 +262,7 @@ fn adapt_normals(rows: &mut VertexRows, count: usize) {
 
 #[inline(always)]
 fn set_frames<const SMOOTH: bool, const TANGENTS: bool>(rows: &mut VertexRows, count: usize) {
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let (back, n_g) = (-rows.direction.get(i), rows.n_g.get(i));
         let n = if SMOOTH { rows.n.get(i) } else { n_g };
         let frame = if TANGENTS { Frame::from_normal_and_tangent(n, rows.dp_du.get(i)) } else { Frame::from_normal(n) };

@@ -6,7 +6,7 @@ use crate::id::LightId;
 use crate::light::{Light, LightContext, LightQueries, LightSample};
 use crate::math::DVec3;
 use crate::math::compact::sort_lanes;
-use crate::math::rows::{BATCH, Row, pair, soa};
+use crate::math::rows::{BATCH, Row, pair, soa, whole_vectors};
 use crate::math::vectorize::vectorize;
 
 soa! {
@@ -124,10 +124,9 @@ fn sample_of_row(light: &AreaLight, views: &ViewRows, i: usize) -> Option<LightS
     is_seen.then(|| sample.with_radiance(light.emission.radiance, 0.0))
 }
 
-// Whole vectors, here and below: what is computed for vertices beyond the count is not used.
 #[inline(always)]
 fn sample_sphere(sphere: &SphereEmitter, u: &[Row; 2], views: &mut ViewRows, count: usize) {
-    for i in 0..count.next_multiple_of(16).min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let point = sphere.sample_from_outside(views.p.get(i), pair(u, i));
         views.q.set(i, point.q);
         views.n.set(i, point.n);
@@ -138,7 +137,7 @@ fn sample_sphere(sphere: &SphereEmitter, u: &[Row; 2], views: &mut ViewRows, cou
 
 #[inline(always)]
 fn see_samples(samples: &WorldSampleRows, views: &mut ViewRows, count: usize) {
-    for i in 0..count.next_multiple_of(16).min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let (q, n) = (samples.p.get(i), samples.n.get(i));
         let (wi, pdf) = EmitterSample::direction_and_pdf(views.p.get(i), q, n, samples.pdf_area[i]);
         views.q.set(i, q);

@@ -6,7 +6,7 @@ use crate::color::Rgb;
 use crate::id::LightId;
 use crate::light::{LightQueries, LightSampleRows, light_target};
 use crate::math::DVec3;
-use crate::math::rows::{BATCH, DVec3Rows, Element, Row, pair, soa};
+use crate::math::rows::{BATCH, DVec3Rows, Element, Row, pair, soa, whole_vectors};
 use crate::math::vectorize::vectorize;
 use crate::sampling::SampleRows;
 
@@ -162,7 +162,6 @@ impl AreaQueue {
     }
 }
 
-// Whole vectors, here and below: what is computed for vertices beyond the count is not used.
 #[inline(always)]
 fn sample_by_area(
     shapes: &ParallelogramRows,
@@ -173,7 +172,7 @@ fn sample_by_area(
     target_p: &mut DVec3Rows,
     count: usize,
 ) {
-    for i in 0..count.next_multiple_of(16).min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let [_, s, t, _] = u.of(i);
         let (sample, is_near) = shapes.get(i).sample_by_area(points.get(i), [s, t], emissions.two_sided[i] != 0);
         target_p.set(i, sample.q);
@@ -191,7 +190,7 @@ fn sample_by_solid_angle(
     views: &mut ViewRows,
     count: usize,
 ) {
-    for i in 0..count.next_multiple_of(16).min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let (p, q) = (points.p.get(i), points.q.get(i));
         let View { wi, pdf, .. } = views.get(i);
         let sample = shapes.get(i).sample_by_solid_angle(p, pair(u, i), &ParallelogramSample { q, wi, pdf });
@@ -210,7 +209,7 @@ fn set_samples(
     samples: &mut LightSampleRows,
     count: usize,
 ) {
-    for i in 0..count.next_multiple_of(16).min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let pdf = views.pdf[i] as f32;
         let is_sampled = (emissions.is_queued[i] != 0) & (pdf > 0.0);
         samples.target[i] = if is_sampled { light_target::POINT } else { light_target::NONE };

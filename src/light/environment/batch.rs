@@ -5,7 +5,7 @@ use super::{EnvironmentMap, Location};
 use crate::color::{Rgb, RgbRows};
 use crate::light::{InfiniteLightEvalRows, MisCompensation};
 use crate::math::Vec3;
-use crate::math::rows::{BATCH, Element, Vec3Rows, soa};
+use crate::math::rows::{BATCH, Element, Vec3Rows, soa, whole_vectors};
 use crate::math::vectorize::vectorize;
 use crate::sampling::PiecewiseCell;
 
@@ -157,10 +157,9 @@ fn look_up(
     vectorize!(interpolate_rows(locations, corners, radiance, count));
 }
 
-// Whole vectors, here and below: what is computed beyond the count is not used.
 #[inline(always)]
 fn locate(map: &EnvironmentMap, directions: &Vec3Rows, locations: &mut LocationRows, count: usize) {
-    for i in 0..count.next_multiple_of(16).min(BATCH) {
+    for i in 0..whole_vectors(count) {
         locations.set(i, map.locate(directions.get(i)));
     }
 }
@@ -173,7 +172,7 @@ fn find_directions(
     samples: &mut InfiniteLightSampleRows,
     count: usize,
 ) {
-    for i in 0..count.next_multiple_of(16).min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let (wi, at) = map.direction_in(
             [cells.x[i], cells.y[i]],
             [cells.u[i], cells.v[i]],
@@ -187,7 +186,7 @@ fn find_directions(
 
 #[inline(always)]
 fn interpolate_rows(locations: &LocationRows, corners: &CornerRows, radiance: &mut RgbRows, count: usize) {
-    for i in 0..count.next_multiple_of(16).min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let upper = [corners.upper_left.get(i), corners.upper_right.get(i)];
         let lower = [corners.lower_left.get(i), corners.lower_right.get(i)];
         radiance.set(i, super::interpolate([upper, lower], locations.get(i).within));

@@ -4,7 +4,7 @@ use pulp::cast;
 use pulp::x86::V4;
 
 use super::{PixelSeed, SOBOL_COLUMNS, Sampler, SamplerKind, SobolSeeds, owen_scramble, pcg_4d, unit};
-use crate::math::rows::BATCH;
+use crate::math::rows::{BATCH, whole_vectors};
 use crate::math::vectorize::vectorize;
 
 /// The pixel samples of a batch.
@@ -90,7 +90,7 @@ impl Sampler {
 /// Draws Sobol points or independent numbers.
 #[inline(always)]
 fn draw<const SOBOL: bool>(requests: &SampleIdRows, count: usize, set: u32, numbers: &mut SampleRows) {
-    for i in 0..count.min(BATCH) {
+    for i in 0..whole_vectors(count) {
         let (pixel, sample) = (requests.pixels[i], requests.samples[i]);
         let bits = if SOBOL { sobol_4d_by_columns(pixel, sample, set) } else { pcg_4d([sample, set, pixel.0, 0]) };
         numbers.set(i, bits);
