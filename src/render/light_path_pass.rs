@@ -109,6 +109,11 @@ impl LightPathPass {
         Some(Self { emitters, points: points.collect(), bounds, ..self })
     }
 
+    /// Whether light paths start at lights at infinity.
+    pub fn has_distant_emitters(&self) -> bool {
+        self.emitters.as_ref().is_some_and(Emitters::has_distant)
+    }
+
     /// Light paths of an epoch over those of the pilot.
     pub fn per_pilot_path(&self) -> f64 {
         f64::from(self.traced) / f64::from(self.pilot_paths())

@@ -41,13 +41,24 @@ const WIDESPREAD: GainBound = GainBound { left_out: 0.05, deviations: 1.0 };
 /// better spread, by which paths without connections gain more.
 const LEAST_EFFICIENCY: f64 = 1.5;
 
-/// Connections are chosen over photons that are worth their time too where their gain by [`COMPARISON`] is this many
-/// times as high. It is estimated too high, as above: as 4 of an interior under the sun, where 16 samples have 1.4
-/// times less error; that of photons as 1.2, where they have as much less.
-const LEAST_ADVANTAGE: f64 = 3.0;
+/// Connections are chosen over photons that are worth their time too where their gain by [`COMPARISON`] is certain to be
+/// this many times as high as that of photons seems.
+const LEAST_ADVANTAGE: f64 = 1.5;
+
+/// The same where light paths start at lights at infinity. Their gain is estimated too high, as above: as 4 of an
+/// interior under the sun, where 16 samples have 1.4 times less error; that of photons as 1.2, where they have as much
+/// less.
+const LEAST_DISTANT_ADVANTAGE: f64 = 3.0;
 
 /// For which of two methods that are is better.
 const COMPARISON: GainBound = GainBound { left_out: 0.05, deviations: 2.0 };
+
+/// Inverse variance for the time over that of unidirectional paths, by [`COMPARISON`].
+#[derive(Clone, Copy)]
+struct Efficiency {
+    at_least: f64,
+    expected: f64,
+}
 
 /// A pilot being traced, with samples without any method.
 struct Pilot<'a, 'b> {
@@ -64,32 +75,36 @@ pub(super) fn choose(renderer: &mut TileRenderer, workspaces: &[Mutex<TileWorksp
     }
     let unidirectional = trace(renderer, UNIDIRECTIONAL_SAMPLES, workspaces);
     let mut pilot = Pilot { renderer, workspaces, unidirectional };
-    let (mut choice, mut best) = (LightTracing::Off, None);
-    if let Some(light_paths) = &light_paths {
+    let connections = light_paths.as_ref().and_then(|light_paths| {
         pilot.renderer.light_paths = Some(light_paths.for_pilot());
         let efficiency = pilot.efficiency(light_paths.per_pilot_path(), Some(WIDESPREAD));
-        if efficiency > best {
-            (choice, best) = (LightTracing::Bidirectional, efficiency);
-        }
         pilot.renderer.light_paths = None;
-    }
-    if let Some(caustics) = caustics {
+        let advantage = if light_paths.has_distant_emitters() { LEAST_DISTANT_ADVANTAGE } else { LEAST_ADVANTAGE };
+        Some((efficiency?.at_least, advantage))
+    });
+    let photons = caustics.and_then(|caustics| {
         let per_pilot_photon = caustics.per_pilot_photon();
         pilot.renderer.caustics = Some(caustics.for_pilot(true));
-        if pilot.efficiency(per_pilot_photon, None) > best.map(|best| best / LEAST_ADVANTAGE) {
-            choice = LightTracing::Photons;
-        }
-        renderer.caustics = renderer.caustics.take().map(|caustics| caustics.for_pilot(false));
-    }
+        let efficiency = pilot.efficiency(per_pilot_photon, None);
+        let caustics = &mut pilot.renderer.caustics;
+        *caustics = caustics.take().map(|caustics| caustics.for_pilot(false));
+        efficiency
+    });
     renderer.light_paths = light_paths;
-    choice
+    match (connections, photons) {
+        (Some((at_least, advantage)), Some(photons)) if at_least > advantage * photons.expected => {
+            LightTracing::Bidirectional
+        }
+        (_, Some(_)) => LightTracing::Photons,
+        (Some(_), None) => LightTracing::Bidirectional,
+        (None, None) => LightTracing::Off,
+    }
 }
 
 impl Pilot<'_, '_> {
-    /// Inverse variance for the time over that of unidirectional paths, at least, with what the renderer has; `None`
-    /// where that is not worth its time, also by the bound of a method whose light is widespread. Of rays from lights,
-    /// the picture has `light_ray_factor` times as many.
-    fn efficiency(&mut self, light_ray_factor: f64, widespread: Option<GainBound>) -> Option<f64> {
+    /// With what the renderer has; `None` where that is not worth its time, also by the bound of a method whose light is
+    /// widespread. Of rays from lights, the picture has `light_ray_factor` times as many.
+    fn efficiency(&mut self, light_ray_factor: f64, widespread: Option<GainBound>) -> Option<Efficiency> {
         let light_rays = self.renderer.trace_from_lights(FIRST_SAMPLE, self.workspaces).total() as f64;
         let samples = trace(self.renderer, SAMPLES, self.workspaces);
         // They are shared by all samples of an epoch.
@@ -111,7 +126,8 @@ impl Pilot<'_, '_> {
         if let Some(bound) = widespread {
             at_least(bound).filter(|&efficiency| efficiency > LEAST_EFFICIENCY)?;
         }
-        at_least(COMPARISON)
+        let expected = GainBound { deviations: 0.0, ..COMPARISON };
+        Some(Efficiency { at_least: at_least(COMPARISON)?, expected: at_least(expected)? })
     }
 }
 

@@ -51,6 +51,11 @@ impl Emitters {
         Some(Self { table: AliasTable::new(&weights)?, lights, distant })
     }
 
+    /// Whether paths start at lights at infinity.
+    pub fn has_distant(&self) -> bool {
+        self.distant.is_some()
+    }
+
     /// The power of surfaces that paths start from, by light.
     fn of_surfaces(scene: &Scene) -> Option<Vec<f64>> {
         let power = |light: &Light| match light {
