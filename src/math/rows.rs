@@ -8,8 +8,8 @@ pub const BATCH: usize = 128;
 /// Lanes of the widest vectors.
 const WIDTH: usize = 16;
 
-/// The first `count` lanes and those after them in the last vector, at most [`BATCH`]. Loops over whole vectors leave no
-/// lanes to be computed one by one; what they compute beyond the count is not used.
+/// The first `count` lanes and those after them in the last vector, at most [`BATCH`]. Loops over whole vectors leave
+/// no lanes to be computed one by one; what they compute beyond the count is not used.
 #[inline(always)]
 pub fn whole_vectors(count: usize) -> usize {
     // The compiler sees that it is a multiple.

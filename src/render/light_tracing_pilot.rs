@@ -41,8 +41,8 @@ const WIDESPREAD: GainBound = GainBound { left_out: 0.05, deviations: 1.0 };
 /// better spread, by which paths without connections gain more.
 const LEAST_EFFICIENCY: f64 = 1.5;
 
-/// Connections are chosen over photons that are worth their time too where their gain by [`COMPARISON`] is certain to be
-/// this many times as high as that of photons seems.
+/// Connections are chosen over photons that are worth their time too where their gain by [`COMPARISON`] is certain to
+/// be this many times as high as that of photons seems.
 const LEAST_ADVANTAGE: f64 = 1.5;
 
 /// The same where light paths start at lights at infinity. Their gain is estimated too high, as above: as 4 of an
@@ -102,8 +102,8 @@ pub(super) fn choose(renderer: &mut TileRenderer, workspaces: &[Mutex<TileWorksp
 }
 
 impl Pilot<'_, '_> {
-    /// With what the renderer has; `None` where that is not worth its time, also by the bound of a method whose light is
-    /// widespread. Of rays from lights, the picture has `light_ray_factor` times as many.
+    /// With what the renderer has; `None` where that is not worth its time, also by the bound of a method whose light
+    /// is widespread. Of rays from lights, the picture has `light_ray_factor` times as many.
     fn efficiency(&mut self, light_ray_factor: f64, widespread: Option<GainBound>) -> Option<Efficiency> {
         let light_rays = self.renderer.trace_from_lights(FIRST_SAMPLE, self.workspaces).total() as f64;
         let samples = trace(self.renderer, SAMPLES, self.workspaces);
