@@ -290,7 +290,8 @@ impl Bsdf {
     }
 }
 
-/// As [`whole_vectors`](crate::math::rows::whole_vectors), of the machine: groups are small, and lanes take long.
+/// The count rounded up to the vectors that the machine has, which may be narrower than those of
+/// [`whole_vectors`](crate::math::rows::whole_vectors): groups are small, and a lane takes long.
 fn machine_vectors(count: usize) -> usize {
     count.next_multiple_of(vectorize::lanes()).min(BATCH)
 }

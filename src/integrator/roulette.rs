@@ -5,7 +5,7 @@
 use super::bidirectional::DistantRay;
 use super::octant_grid::{OctantGrid, cell_count};
 use crate::desc::DEFAULT_RR_DEPTH;
-use crate::math::rows::{BATCH, DVec3Rows, Row, Vec3Rows};
+use crate::math::rows::{BATCH, DVec3Rows, Row, Vec3Rows, whole_vectors};
 use crate::math::vectorize::vectorize;
 use crate::math::{Aabb, Vec3};
 
@@ -233,8 +233,8 @@ impl ContinuationGrid {
     /// The roots at the first `count` points, whose normals are turned to the side on which `cos_side` is positive.
     pub(super) fn find(&self, points: &DVec3Rows, normals: &Vec3Rows, cos_side: &Row, roots: &mut Row, count: usize) {
         let mut cells = [0; BATCH];
-        vectorize!(find_cells(self, points, normals, cos_side, &mut cells[..count]));
-        for (root, &cell) in roots.iter_mut().zip(&cells[..count]) {
+        vectorize!(find_cells(self, points, normals, cos_side, &mut cells[..whole_vectors(count)]));
+        for (root, &cell) in roots.iter_mut().zip(&cells).take(count) {
             *root = self.roots[cell as usize];
         }
     }

@@ -4,16 +4,13 @@ use pulp::bytemuck::cast_mut;
 use pulp::cast;
 use pulp::x86::{V3, V4};
 
-use super::rows::{BATCH, Row};
-
-/// Numbers that are compacted at once.
-const WIDTH: usize = 16;
+use super::rows::{BATCH, Row, WIDTH, whole_vectors};
 
 /// Chosen lanes of a block.
 #[derive(Clone, Copy, Debug)]
 pub struct Compaction {
     masks: [u16; BATCH / WIDTH],
-    /// The masks up to the last that may have a bit: blocks are often nearly empty after many bounces.
+    /// How many of the masks may have bits: blocks are often nearly empty after many bounces.
     used: usize,
     count: usize,
     instructions: Instructions,
@@ -149,8 +146,8 @@ impl Compaction {
     #[inline(always)]
     fn new(flags: &Row<u32>, count: usize, is_chosen: impl Fn(u32) -> bool) -> Self {
         let mut masks = [0u16; BATCH / WIDTH];
-        let used = count.div_ceil(WIDTH).min(masks.len());
-        for (i, (mask, flags)) in masks[..used].iter_mut().zip(flags.as_chunks::<WIDTH>().0).enumerate() {
+        let used = whole_vectors(count) / WIDTH;
+        for (i, (mask, flags)) in masks.iter_mut().zip(flags.as_chunks::<WIDTH>().0).enumerate().take(used) {
             let chosen = (0..).zip(flags).fold(0, |bits, (lane, &flag)| bits | u32::from(is_chosen(flag)) << lane);
             let within = count.saturating_sub(i * WIDTH).min(WIDTH);
             *mask = (chosen & ((1 << within) - 1)) as u16;
@@ -235,7 +232,7 @@ impl Compaction {
         mut next: Option<&mut Row<T>>,
         mut at: usize,
     ) {
-        for (&bits, numbers) in self.masks[..self.used.min(BATCH / WIDTH)].iter().zip(from.as_chunks::<WIDTH>().0) {
+        for (&bits, numbers) in self.masks.iter().zip(from.as_chunks::<WIDTH>().0).take(self.used) {
             let count = bits.count_ones() as usize;
             // Of a length that the compiler knows: else each is a call.
             let whole = if at < BATCH {

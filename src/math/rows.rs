@@ -6,7 +6,7 @@ use super::{DVec3, Vec2, Vec3};
 pub const BATCH: usize = 128;
 
 /// Lanes of the widest vectors.
-const WIDTH: usize = 16;
+pub const WIDTH: usize = 16;
 
 /// The first `count` lanes and those after them in the last vector, at most [`BATCH`]. Loops over whole vectors leave
 /// no lanes to be computed one by one; what they compute beyond the count is not used.
@@ -216,3 +216,14 @@ macro_rules! soa {
 }
 
 pub(crate) use soa;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_vectors_hold_the_count_up_to_a_row() {
+        let counts = [0, 1, 15, 16, 17, 112, 113, BATCH, BATCH + 1];
+        assert_eq!(counts.map(whole_vectors), [0, 16, 16, 16, 32, 112, BATCH, BATCH, BATCH]);
+    }
+}

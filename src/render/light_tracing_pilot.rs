@@ -4,6 +4,7 @@
 use std::sync::Mutex;
 
 use super::LightTracing;
+use super::light_path_pass::LightPathPass;
 use super::pilot_samples::{FIRST_SAMPLE, PilotSamples};
 use super::tile_renderer::{TileRenderer, TileWorkspace};
 use crate::integrator::{EPOCH, Guidance};
@@ -41,23 +42,23 @@ const WIDESPREAD: GainBound = GainBound { left_out: 0.05, deviations: 1.0 };
 /// better spread, by which paths without connections gain more.
 const LEAST_EFFICIENCY: f64 = 1.5;
 
-/// Connections are chosen over photons that are worth their time too where their gain by [`COMPARISON`] is certain to
-/// be this many times as high as that of photons seems.
-const LEAST_ADVANTAGE: f64 = 1.5;
-
-/// The same where light paths start at lights at infinity. Their gain is estimated too high, as above: as 4 of an
-/// interior under the sun, where 16 samples have 1.4 times less error; that of photons as 1.2, where they have as much
-/// less.
-const LEAST_DISTANT_ADVANTAGE: f64 = 3.0;
-
 /// For which of two methods that are is better.
 const COMPARISON: GainBound = GainBound { left_out: 0.05, deviations: 2.0 };
+
+/// Where both are worth their time, connections are chosen over photons if the lower bound of their efficiency is this
+/// many times the estimate of that of photons.
+const LEAST_ADVANTAGE: f64 = 1.5;
+
+/// The same where light paths start at lights at infinity. The gain of connections is estimated too high there: as 4 of
+/// an interior under the sun, where 16 samples have 1.4 times less error; that of photons as 1.2, where they have as
+/// much less.
+const LEAST_DISTANT_ADVANTAGE: f64 = 3.0;
 
 /// Inverse variance for the time over that of unidirectional paths, by [`COMPARISON`].
 #[derive(Clone, Copy)]
 struct Efficiency {
-    at_least: f64,
-    expected: f64,
+    estimate: f64,
+    lower_bound: f64,
 }
 
 /// A pilot being traced, with samples without any method.
@@ -79,9 +80,9 @@ pub(super) fn choose(renderer: &mut TileRenderer, workspaces: &[Mutex<TileWorksp
         pilot.renderer.light_paths = Some(light_paths.for_pilot());
         let efficiency = pilot.efficiency(light_paths.per_pilot_path(), Some(WIDESPREAD));
         pilot.renderer.light_paths = None;
-        let advantage = if light_paths.has_distant_emitters() { LEAST_DISTANT_ADVANTAGE } else { LEAST_ADVANTAGE };
-        Some((efficiency?.at_least, advantage))
+        efficiency
     });
+    let is_distant = light_paths.as_ref().is_some_and(LightPathPass::has_distant_emitters);
     let photons = caustics.and_then(|caustics| {
         let per_pilot_photon = caustics.per_pilot_photon();
         pilot.renderer.caustics = Some(caustics.for_pilot(true));
@@ -91,8 +92,13 @@ pub(super) fn choose(renderer: &mut TileRenderer, workspaces: &[Mutex<TileWorksp
         efficiency
     });
     renderer.light_paths = light_paths;
+    better(connections, photons, if is_distant { LEAST_DISTANT_ADVANTAGE } else { LEAST_ADVANTAGE })
+}
+
+/// The better of two methods, each if it is worth its time.
+fn better(connections: Option<Efficiency>, photons: Option<Efficiency>, least_advantage: f64) -> LightTracing {
     match (connections, photons) {
-        (Some((at_least, advantage)), Some(photons)) if at_least > advantage * photons.expected => {
+        (Some(connections), Some(photons)) if connections.lower_bound > least_advantage * photons.estimate => {
             LightTracing::Bidirectional
         }
         (_, Some(_)) => LightTracing::Photons,
@@ -119,15 +125,15 @@ impl Pilot<'_, '_> {
         if !have_noise && !miss_light {
             return None;
         }
-        let at_least = |GainBound { left_out, deviations }: GainBound| {
+        let lower_bound = |GainBound { left_out, deviations }: GainBound| {
             samples.gain(left_out).map(|gain| (gain.value - deviations * gain.deviation) / cost)
         };
-        at_least(WORTHWHILE).filter(|&efficiency| efficiency > 1.0)?;
+        lower_bound(WORTHWHILE).filter(|&efficiency| efficiency > 1.0)?;
         if let Some(bound) = widespread {
-            at_least(bound).filter(|&efficiency| efficiency > LEAST_EFFICIENCY)?;
+            lower_bound(bound).filter(|&efficiency| efficiency > LEAST_EFFICIENCY)?;
         }
-        let expected = GainBound { deviations: 0.0, ..COMPARISON };
-        Some(Efficiency { at_least: at_least(COMPARISON)?, expected: at_least(expected)? })
+        let estimate = lower_bound(GainBound { deviations: 0.0, ..COMPARISON })?;
+        Some(Efficiency { estimate, lower_bound: lower_bound(COMPARISON)? })
     }
 }
 
@@ -137,4 +143,27 @@ fn trace(renderer: &TileRenderer, samples: u32, workspaces: &[Mutex<TileWorkspac
     };
     let moments = |workspace: &TileWorkspace| workspace.integrator.pilot_moments().to_vec();
     PilotSamples::trace(renderer.whole_view(), samples, workspaces, render, moments)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn efficiency(gain: f64, deviation: f64, cost: f64) -> Option<Efficiency> {
+        Some(Efficiency { estimate: gain / cost, lower_bound: (gain - 2.0 * deviation) / cost })
+    }
+
+    #[test]
+    fn connections_are_chosen_over_photons_by_a_certain_advantage() {
+        let (photons, bidirectional) = (LightTracing::Photons, LightTracing::Bidirectional);
+        // Balls of glass, with one bright sample; a box with a block of copper; the same gains under a sun.
+        let glass = efficiency(24.3, 13.2, 1.25);
+        assert_eq!(better(efficiency(14.4, 9.9, 1.57), glass, LEAST_ADVANTAGE), photons);
+        let (connections, copper) = (efficiency(2.67, 0.05, 1.55), efficiency(1.14, 0.02, 1.24));
+        assert_eq!(better(connections, copper, LEAST_ADVANTAGE), bidirectional);
+        assert_eq!(better(connections, copper, LEAST_DISTANT_ADVANTAGE), photons);
+        assert_eq!(better(connections, None, LEAST_DISTANT_ADVANTAGE), bidirectional);
+        assert_eq!(better(None, copper, LEAST_ADVANTAGE), photons);
+        assert_eq!(better(None, None, LEAST_ADVANTAGE), LightTracing::Off);
+    }
 }
