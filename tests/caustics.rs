@@ -163,12 +163,30 @@ fn lamp_beside_a_mirror(lamp: &Value) -> Value {
     scene
 }
 
-/// Mean radiance of that floor by a lamp of intensity 1 at this x, 1 above the floor.
-fn floor_radiance(lamp: f64) -> f64 {
-    let at = |i: i32| (f64::from(i) + 0.5) / 200.0 * 2.4 - 1.2;
-    let points = (0..200).flat_map(|i| (0..200).map(move |j| (at(i) + 2.5 - lamp, at(j))));
-    let irradiance = points.map(|(x, z)| (x * x + 1.0 + z * z).powf(-1.5)).sum::<f64>() / 40_000.0;
+/// Mean radiance of the picture where such a floor is in these ranges of x, by a lamp of intensity 1 at this x, 1 above
+/// the floor.
+fn strips_radiance(lamp: f64, strips: &[[f64; 2]]) -> f64 {
+    let at = |i: i32| (f64::from(i) + 0.5) / 600.0 * 2.4 - 1.2;
+    let columns = (0..600).map(|i| at(i) + 2.5).filter(|&x| strips.iter().any(|&[from, to]| (from..to).contains(&x)));
+    let points = columns.flat_map(|x| (0..600).map(move |j| (x - lamp, at(j))));
+    let irradiance = points.map(|(x, z)| (x * x + 1.0 + z * z).powf(-1.5)).sum::<f64>() / 360_000.0;
     0.5 / std::f64::consts::PI * irradiance
+}
+
+/// The same of the whole floor.
+fn floor_radiance(lamp: f64) -> f64 {
+    strips_radiance(lamp, &[[0.0, 6.0]])
+}
+
+/// The mean of the red channel of a picture of that floor.
+fn mean_red(scene: &Value, caustics: CausticsDesc, overrides: &Overrides) -> f64 {
+    let image = of(scene, caustics, overrides);
+    let red = |i: u32| f64::from(image.pixel(LayerKind::Color, i % 32, i / 32).unwrap()[0]);
+    (0..32 * 32).map(red).sum::<f64>() / (32.0 * 32.0)
+}
+
+fn with_samples(spp: u32) -> Overrides {
+    Overrides { spp: Some(spp), ..Overrides::default() }
 }
 
 /// Paths never meet a point light. A sphere of the same intensity has the same irradiance.
@@ -180,23 +198,18 @@ fn photons_find_what_a_mirror_shows_of_a_lamp() {
         "type": "sphere", "material": "white", "radius": 0.1, "transform": [{ "translate": [1, 1, 0] }],
         "emission": { "radiance": [radiance, radiance, radiance] }
     });
-    let mean = |scene: &Value, caustics, spp| {
-        let image = of(scene, caustics, &Overrides { spp: Some(spp), ..Overrides::default() });
-        let red = |i: u32| f64::from(image.pixel(LayerKind::Color, i % 32, i / 32).unwrap()[0]);
-        (0..32 * 32).map(red).sum::<f64>() / (32.0 * 32.0)
-    };
     let (direct, mirrored) = (floor_radiance(1.0), floor_radiance(-1.0));
     for lamp in [&point, &sphere] {
         let mut scene = lamp_beside_a_mirror(lamp);
-        let found = (mean(&scene, CausticsDesc::Photons, 512) - direct) / mirrored;
+        let found = (mean_red(&scene, CausticsDesc::Photons, &with_samples(512)) - direct) / mirrored;
         // Eight standard errors of the sphere (0.0023 over 20 seeds); the blur of the point's photons is 0.0008.
         assert!((found - 1.0).abs() < 0.02, "{lamp}: {found}");
         // Paths of two segments are too short for the mirror.
         scene["integrator"]["max_depth"] = json!(2);
-        let found = mean(&scene, CausticsDesc::Photons, 64) / direct;
+        let found = mean_red(&scene, CausticsDesc::Photons, &with_samples(64)) / direct;
         assert!((found - 1.0).abs() < 0.005, "{lamp}: {found}");
     }
-    let without = mean(&lamp_beside_a_mirror(&point), CausticsDesc::Paths, 64) / direct;
+    let without = mean_red(&lamp_beside_a_mirror(&point), CausticsDesc::Paths, &with_samples(64)) / direct;
     assert!((without - 1.0).abs() < 0.005, "{without}");
 }
 
@@ -214,6 +227,39 @@ fn pictures_with_photons_do_not_depend_on_threads_or_accelerators() {
     let first = image(1, AccelKind::EMBREE);
     assert!([2, 3].into_iter().all(|threads| image(threads, AccelKind::EMBREE) == first));
     assert_ne!(first, of_seed(&balls(), CausticsDesc::Paths, 0, 12));
+}
+
+/// Photons are gathered within 0.15 of the floor, whose strips are narrower or end below a block, with a partition that
+/// is thinner than that.
+#[test]
+fn what_photons_carry_to_edges_and_corners_is_not_lost() {
+    let point = json!({ "type": "point", "position": [1, 1, 0], "intensity": [1, 1, 1] });
+    let strip = |[from, to]: [f64; 2]| {
+        json!({ "type": "quad", "material": "white", "origin": [from, 0, 3], "edge_u": [to - from, 0, 0],
+                "edge_v": [0, 0, -6] })
+    };
+    let cube = |size: [f64; 3], center: [f64; 3]| {
+        let transform = json!([{ "scale": size }, { "translate": center }]);
+        json!({ "type": "cube", "material": "black", "transform": transform })
+    };
+    let slats: Vec<[f64; 2]> = (0..12).map(|i| f64::from(i) * 0.2 + 1.36).map(|x| [x, x + 0.06]).collect();
+    let bare = [[0.0, 2.6]];
+    let cases = [
+        ("slats", &slats[..], slats.iter().copied().map(strip).collect::<Vec<_>>()),
+        // The lamp and what the mirror shows of it are in the plane of the partition.
+        ("block", &bare, vec![strip([0.0, 6.0]), cube([0.7, 0.25, 2.0], [3.3, 0.25, 0.0])]),
+        ("partition", &[[0.0, 6.0]], vec![strip([0.0, 6.0]), cube([1.0, 0.25, 1e-3], [2.5, 0.25, 0.0])]),
+    ];
+    for (what, strips, shapes) in cases {
+        let mut scene = lamp_beside_a_mirror(&point);
+        scene["materials"]["black"] = json!({ "type": "diffuse", "albedo": 0 });
+        let mirror = scene["shapes"][1].clone();
+        scene["shapes"] = json!([mirror]);
+        scene["shapes"].as_array_mut().unwrap().extend(shapes);
+        let [direct, mirrored] = [1.0, -1.0].map(|lamp| strips_radiance(lamp, strips));
+        let found = (mean_red(&scene, CausticsDesc::Photons, &with_samples(64)) - direct) / mirrored;
+        assert!((found - 1.0).abs() < 0.02, "{what}: {found}");
+    }
 }
 
 /// The balls within a sphere that emits as much as its wall absorbs, where paths have no noise.
@@ -261,13 +307,12 @@ fn a_pilot_adds_no_caustics_of_point_lights() {
         let mut scene = lamp_beside_a_mirror(&sphere);
         scene["lights"] = lights;
         let overrides = Overrides { spp: Some(64), bidirectional: Some(AutoDesc::Off), ..Overrides::default() };
-        let image = of(&scene, caustics, &overrides);
-        (0..32 * 32).map(|i| f64::from(image.pixel(LayerKind::Color, i % 32, i / 32).unwrap()[0])).sum::<f64>()
+        mean_red(&scene, caustics, &overrides)
     };
     let point = || json!([{ "type": "point", "position": [1.5, 1, 0], "intensity": [3, 3, 3] }]);
     let lamp = red(CausticsDesc::Photons, json!([]));
     assert_eq!(red(CausticsDesc::Auto, json!([])), lamp);
-    let [direct, mirrored] = [1.5, -1.5].map(|x| 3.0 * floor_radiance(x) * 1024.0);
+    let [direct, mirrored] = [1.5, -1.5].map(|x| 3.0 * floor_radiance(x));
     let (auto, photons) = (red(CausticsDesc::Auto, point()), red(CausticsDesc::Photons, point()));
     let (added, caustic) = ((auto - lamp) / direct, (photons - auto) / mirrored);
     assert!((added - 1.0).abs() < 0.01 && (caustic - 1.0).abs() < 0.1, "{added} {caustic}");

@@ -30,7 +30,9 @@ pub use bidirectional::{
     ClusteredVertices, ConnectionPilot, ConnectionTables, DistantRay, Emitters, LightPaths, LightVertex,
 };
 pub use cancel::Cancel;
-pub use caustics::{CausticCasters, CausticPoint, Caustics, EPOCH, Photon, PhotonMap};
+pub use caustics::{
+    CausticCasters, CausticPoint, Caustics, DiscSamples, EPOCH, Photon, PhotonMap, correct_for_coverage,
+};
 pub use debug::{AmbientOcclusion, DebugView, View};
 use path::PathBuffers;
 pub use path::PathIntegrator;

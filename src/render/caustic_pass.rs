@@ -7,7 +7,10 @@ use super::epoch::trace_parts;
 use super::tile_renderer::TileWorkspace;
 use super::{LightTracing, Settings};
 use crate::accel::Accelerator;
-use crate::integrator::{CausticCasters, Caustics, EPOCH, Integrator, PassContext, PhotonMap, PhotonRange, RayCounts};
+use crate::integrator::{
+    CausticCasters, Caustics, DiscSamples, EPOCH, Integrator, PassContext, PhotonMap, PhotonRange, RayCounts,
+    correct_for_coverage,
+};
 use crate::math::Vec2;
 use crate::sampling::{PixelSeed, Sampler};
 use crate::scene::Scene;
@@ -99,13 +102,18 @@ impl CausticPass {
         // Beyond all pixels.
         let seed: PixelSeed = sampler.pixel(epoch, u32::MAX);
         let traced = if self.is_pilot { *PHOTONS.start() as u32 } else { self.traced };
-        let (photons, counts) = trace_parts(traced, workspaces, |indices, workspace, photons| {
+        let (mut photons, mut counts) = trace_parts(traced, workspaces, |indices, workspace, photons| {
             integrator.trace_photons(pass, &self.casters, &PhotonRange { seed, indices }, workspace, photons);
         });
         // Slower than the variance falls, so that both vanish (Knaus and Zwicker 2011, with alpha = 2/3).
         let factor =
             if self.is_pilot { self.per_pilot_photon().sqrt() as f32 } else { ((epoch + 1) as f32).powf(-1.0 / 6.0) };
-        self.map = Some((epoch, PhotonMap::new(photons, traced, self.radius * factor)));
+        let radius = self.radius * factor;
+        if !self.is_pilot {
+            let samples = DiscSamples { sampler, seed: sampler.pixel(epoch, u32::MAX - 3) };
+            counts.indirect += correct_for_coverage(&mut photons, pass.world, radius, samples);
+        }
+        self.map = Some((epoch, PhotonMap::new(photons, traced, radius)));
         counts
     }
 }

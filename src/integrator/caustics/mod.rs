@@ -10,9 +10,11 @@
 //! as samples are added (Knaus and Zwicker 2011).
 
 mod casters;
+mod coverage;
 mod photon_map;
 
 pub use casters::{CausticCasters, CausticPoint};
+pub use coverage::{DiscSamples, correct_for_coverage};
 pub use photon_map::{Photon, PhotonMap};
 
 /// Samples of a pixel that gather the same photons.

@@ -51,6 +51,18 @@ pub struct PhotonReference {
     photon: u32,
 }
 
+/// Whether something gathers what is at the distance `d` from it, where its surface has the unit normal `n`.
+#[inline]
+pub(super) fn is_around(d: Vec3, n: Vec3, radius: f32) -> bool {
+    d.length_squared() < radius * radius && d.dot(n).abs() < 0.5 * radius
+}
+
+/// Whether two surfaces with these unit normals are about the same.
+#[inline]
+pub(super) fn is_about_parallel(n: Vec3, other: Vec3) -> bool {
+    n.dot(other).abs() > 0.7
+}
+
 /// The width of a cell over the radius.
 const CELL_WIDTH: f32 = 4.0;
 
@@ -105,13 +117,11 @@ impl PhotonMap {
     #[inline]
     pub fn near<'a>(&'a self, candidates: &'a [PhotonReference], p: Vec3, n: Vec3) -> impl Iterator<Item = &'a Photon> {
         candidates.iter().filter_map(move |reference| {
-            let d = reference.p - p;
-            if d.length_squared() >= self.radius * self.radius || d.dot(n).abs() >= 0.5 * self.radius {
+            if !is_around(reference.p - p, n, self.radius) {
                 return None;
             }
-            // Arrived on a surface that is about the same.
             let photon = &self.photons[reference.photon as usize];
-            (photon.n.dot(n).abs() > 0.7).then_some(photon)
+            is_about_parallel(photon.n, n).then_some(photon)
         })
     }
 
