@@ -4,7 +4,8 @@
     benches/peers.py [--scenes cornell,glass,bunny_x] [--spp 16,64] [--rounds 3] [--variants scalar_rgb,llvm_ad_rgb]
                      [--steradian target/release/steradian] [--mitsuba mitsuba]
 
-Renderers take turns, each with all processors (taskset limits them). Each renders with both numbers of samples; the rate comes from the difference of
+Both trace paths from the camera: no photons, no connections. Renderers take turns, each with all processors (taskset limits them). Each renders with
+both numbers of samples; the rate comes from the difference of
 the two times, so that starting, reading and building are not in it. Prints medians over the rounds in Msamples/s, peak memory in MB, and the median of
 the rates' ratios within a round.
 Needs `cargo build --release`, `cargo xtask bench_scenes` and `pip install mitsuba` (DRJIT_LIBLLVM_PATH set for the llvm variants if need be).
@@ -23,6 +24,9 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+
+# Mitsuba's files ask for paths from the camera.
+PATHS = ["--caustics", "paths", "--bidirectional", "off"]
 
 
 def measured(command):
@@ -76,7 +80,7 @@ def main():
             if missing:
                 sys.exit(f"peers.py: {scene.parent / missing[0]} is missing: cargo xtask bench_scenes")
             width, height = (int(re.search(rf'"{side}" value="(\d+)"', text)[1]) for side in ("width", "height"))
-            commands = [lambda n: [arguments.steradian, "render", scene, "--spp", n, "-q", "-o", out]]
+            commands = [lambda n: [arguments.steradian, "render", scene, "--spp", n, "-q", "-o", out, *PATHS]]
             for variant in variants:
                 commands.append(lambda n, variant=variant: [arguments.mitsuba, "-m", variant, "-D", f"spp={n}", "-o", out, scene])
             rounds = [[rate(command, width * height, spp) for command in commands] for _ in range(arguments.rounds)]
