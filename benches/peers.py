@@ -5,9 +5,8 @@
                      [--steradian target/release/steradian] [--mitsuba mitsuba]
 
 Both trace paths from the camera: no photons, no connections. Renderers take turns, each with all processors (taskset limits them). Each renders with
-both numbers of samples; the rate comes from the difference of
-the two times, so that starting, reading and building are not in it. Prints medians over the rounds in Msamples/s, peak memory in MB, and the median of
-the rates' ratios within a round.
+both numbers of samples; the rate comes from the difference of the two times, so that starting, reading and building are not in it. Prints medians over
+the rounds in Msamples/s, peak memory in MB, and the median of the rates' ratios within a round.
 Needs `cargo build --release`, `cargo xtask bench_scenes` and `pip install mitsuba` (DRJIT_LIBLLVM_PATH set for the llvm variants if need be).
 Without Mitsuba only Steradian is measured. Figures of a busy machine mean nothing.
 """
@@ -25,7 +24,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 
-# Mitsuba's files ask for paths from the camera.
+# Mitsuba's integrator `path` has neither photons nor connections.
 PATHS = ["--caustics", "paths", "--bidirectional", "off"]
 
 

@@ -110,6 +110,7 @@ impl CausticPass {
             if self.is_pilot { self.per_pilot_photon().sqrt() as f32 } else { ((epoch + 1) as f32).powf(-1.0 / 6.0) };
         let radius = self.radius * factor;
         if !self.is_pilot {
+            // Beyond all pixels too, and not those of the photons.
             let samples = DiscSamples { sampler, seed: sampler.pixel(epoch, u32::MAX - 3) };
             counts.indirect += correct_for_coverage(&mut photons, pass.world, radius, samples);
         }

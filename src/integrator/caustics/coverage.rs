@@ -19,7 +19,7 @@ const TRIED: u32 = 64;
 /// Surfaces between two points, at most.
 const CROSSED: u32 = 8;
 
-/// Random numbers of the discs of an epoch's photons, which are numbered.
+/// Random numbers for the photons of an epoch, by their index.
 #[derive(Clone, Copy, Debug)]
 pub struct DiscSamples<'a> {
     /// The sampler.
@@ -35,7 +35,8 @@ pub struct DiscSamples<'a> {
 /// The number of points of the disc that have to be tried before one is on such a surface has the expected value wanted
 /// ("Unbiased Photon Gathering for Light Transport Simulation", Qin et al. 2015, estimates another probability by it).
 /// Most photons need a single point. Where the first is not on such a surface, what is still to be expected is
-/// estimated by the mean of several such numbers.
+/// estimated by the mean of several such numbers. A photon keeps its power if none of the points is.
+/// Mirrors and glass beside a surface that gathers count as part of it.
 pub fn correct_for_coverage(photons: &mut [Photon], world: &World, radius: f32, samples: DiscSamples) -> u64 {
     let correct = |(i, photon): (usize, &mut Photon)| {
         let mut disc = Disc::new(world, photon, radius);
@@ -71,7 +72,7 @@ struct Disc<'a> {
     frame: Frame,
     radius: f32,
     height: f32,
-    /// That were traced.
+    /// Rays traced so far.
     rays: u64,
 }
 
@@ -90,8 +91,8 @@ impl<'a> Disc<'a> {
         true
     }
 
-    /// Whether a point of the unit disc is on a surface that gathers the photon. Things that are thinner than the disc
-    /// may be in between; what is within them, or beyond a wall, is not seen by anybody.
+    /// Whether a point of the unit disc is on a surface that gathers the photon. A closed object may be in between,
+    /// which the ray enters and leaves; surfaces within it, or beyond the single surface of a wall, are invisible.
     fn is_covered(&mut self, point: Vec2) -> bool {
         let across = (self.frame.x * point.x + self.frame.y * point.y) * self.radius;
         let up = self.frame.z * self.height;
