@@ -4,13 +4,14 @@ use serde_json::{Value, json};
 
 use crate::util::render::{Estimate, merge, pixels, render};
 
-/// A ball of glass with a smaller one of water in it, between two coloured lamps and a mirror.
+/// A ball of glass with a smaller one of water in it, between two coloured lamps and a mirror. The strategy `light`
+/// does not split paths, as no render with media does.
 fn balls(materials: Value, balls: Value) -> Value {
     let mut scene = json!({
         "film": { "width": 32, "height": 32, "filter": { "type": "box" } },
         "camera": { "position": [0, 0.3, 6], "look_at": [0, 0, 0], "vertical_fov_degrees": 24 },
         "sampler": { "type": "independent", "spp": 16 },
-        "integrator": { "type": "path", "max_depth": 24, "rr_depth": 6 },
+        "integrator": { "type": "path", "max_depth": 24, "rr_depth": 6, "strategy": "light" },
         "materials": { "black": { "type": "diffuse", "albedo": 0 }, "white": { "type": "diffuse", "albedo": 0.9 } },
         "lights": [{ "type": "environment", "radiance": [0.2, 0.3, 0.5] }]
     });

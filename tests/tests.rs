@@ -131,6 +131,7 @@ mod scene_files;
 mod shards;
 /// Subdivision surfaces and displacement.
 mod specular_direct;
+mod splitting;
 mod subdivision;
 /// Random walks below surfaces.
 mod subsurface;

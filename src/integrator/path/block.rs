@@ -2,6 +2,7 @@
 
 use super::Context;
 use super::materials::BsdfTable;
+use super::splitting::SplitRows;
 use crate::bsdf::{Bsdf, BsdfEval, Lambert, Principled};
 use crate::color::Rgb;
 use crate::geometry::{Hit, SpawnPoint, SurfaceInteraction, WorldNormalRows, WorldPointRows};
@@ -234,6 +235,9 @@ pub(super) struct Vertices {
     /// Vertices whose materials have textures.
     pub textured: Vec<u8>,
     pub bsdfs: BsdfTable,
+    pub splits: SplitRows,
+    /// Vertices where paths may be split.
+    pub split_lanes: Vec<u8>,
     pub requests: SampleIdRows,
     /// Choice of a light (two) and a point of it (two).
     pub u_light: SampleRows,
@@ -369,8 +373,9 @@ impl Vertices {
     /// What a mirror or clear glass leaves of features behind it; `None` for all other scattering.
     pub fn feature_factor(&self, lane: usize) -> Option<Rgb> {
         let is_smooth = self.rows.flags[lane] & vertex_flags::DELTA != 0 && self.scatter.is_delta[lane] != 0;
-        // Radiance is scaled by refraction, albedo is not.
-        is_smooth.then(|| self.scatter.weight.get(lane) * self.scatter.rr_factor[lane])
+        // Radiance is scaled by refraction, albedo is not, and a path that was split has all features of its sample.
+        let factor = self.scatter.rr_factor[lane] / self.splits.remaining(lane);
+        is_smooth.then(|| self.scatter.weight.get(lane) * factor)
     }
 
     /// Clamps what shadow rays contribute.

@@ -1,5 +1,6 @@
 //! What light AOVs and AOVs of surfaces beyond the first need to know of paths; empty where none is requested.
 
+use super::wave::set_or_push;
 use super::{Context, PathIntegrator};
 use crate::color::Rgb;
 use crate::id::LightId;
@@ -58,6 +59,21 @@ impl LightAovs {
             (true, 0) => LightEvent::Direct(lobes()),
             (true, _) => LightEvent::Indirect(lobes()),
             (false, _) => self.event(context.bounce + 1 + scatterings, path, LightEvent::Emission),
+        }
+    }
+
+    /// How a path left its first surface; `None` at that surface, and without AOVs by scattering.
+    pub fn lobes(&self, path: usize) -> Option<LobeWeights> {
+        self.lobes.get(path).copied()
+    }
+
+    /// Sets the state of a path that begins at a vertex of another.
+    pub fn start_branch(&mut self, context: &Context, path: usize, lobes: LobeWeights) {
+        if context.config.light_aovs.by_scattering {
+            set_or_push(&mut self.lobes, path, lobes);
+        }
+        if context.config.surface_aovs.features {
+            set_or_push(&mut self.features, path, None);
         }
     }
 

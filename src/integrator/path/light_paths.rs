@@ -62,7 +62,7 @@ pub(super) fn trace(
             advance(&context, wave, block, light_vertices);
             survivors = wave.append(&context, block, survivors);
         }
-        wave.finish_bounce(survivors);
+        wave.finish_bounce(&context, survivors);
     }
     traced.add(&wave.counts);
     counts.indirect += traced.total();

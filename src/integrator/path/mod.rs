@@ -27,6 +27,7 @@ mod photons;
 mod radiance;
 mod scatter;
 mod specular_direct;
+mod splitting;
 mod subsurface;
 mod surface_aovs;
 mod terminator;
@@ -272,13 +273,14 @@ impl PathIntegrator {
                     connection_mis::arrive(wave, block);
                     connections::sample(context, wave, block);
                 }
+                splitting::split(context, wave, block);
                 specular_direct::add(context, wave, block);
                 direct::sample(context, regions.as_ref(), wave, block);
                 caustics::gather(context, wave, block, out);
                 scatter::sample(context, regions.as_ref(), wave, block);
                 survivors = wave.append(context, block, survivors);
             }
-            wave.finish_bounce(survivors);
+            wave.finish_bounce(context, survivors);
             trace::shadow(context, wave, out, counts);
             wave.guided.mark_radiance(out);
             wave.continuations.mark_radiance(out);

@@ -80,7 +80,7 @@ pub(super) fn trace(
             scatter_light(&context, source, wave, block);
             survivors = wave.append(&context, block, survivors);
         }
-        wave.finish_bounce(survivors);
+        wave.finish_bounce(&context, survivors);
     }
     traced.add(&wave.counts);
     counts.indirect += traced.total();

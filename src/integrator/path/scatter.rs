@@ -67,11 +67,11 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
 
 /// Samples the BSDFs that are not diffuse.
 fn sample_non_diffuse(context: &Context, vertices: &mut Vertices, rows: &mut BsdfScratch) {
-    let Vertices { rows: vertex, scatter, non_diffuse, bsdfs, u_bsdf, .. } = vertices;
+    let Vertices { rows: vertex, scatter, non_diffuse, bsdfs, splits, u_bsdf, .. } = vertices;
     for lanes in bsdfs.groups(non_diffuse) {
         let u = |lane: usize| {
             let [u_lobe, u, v, _] = u_bsdf.of(lane);
-            [u_lobe, u, v]
+            [splits.lobe_choice(lane, u_lobe), u, v]
         };
         if !bsdfs.sample_group(context.scene, &vertex.wo, lanes, u, rows) {
             continue;
@@ -80,7 +80,7 @@ fn sample_non_diffuse(context: &Context, vertices: &mut Vertices, rows: &mut Bsd
         for (i, &lane) in lanes.iter().enumerate() {
             let lane = usize::from(lane);
             scatter.wi.set(lane, samples.wi.get(i));
-            scatter.weight.set(lane, samples.weight.get(i));
+            scatter.weight.set(lane, samples.weight.get(i) * splits.remaining(lane));
             scatter.pdf[lane] = samples.pdf[i];
             scatter.rr_factor[lane] = samples.eta[i] * samples.eta[i];
             scatter.is_valid[lane] = samples.is_valid[i];

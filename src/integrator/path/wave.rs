@@ -12,6 +12,7 @@ use super::miss::MissScratch;
 use super::moments::Moments;
 use super::photons::PhotonState;
 use super::specular_direct::SpecularRows;
+use super::splitting::Branch;
 use super::terminator::TerminatorRays;
 use super::{Context, dimensions};
 use crate::accel::HitRows;
@@ -164,6 +165,8 @@ pub(super) struct Wave {
     pub miss: MissScratch,
     pub bsdf_rows: BsdfScratch,
     pub specular_rows: SpecularRows,
+    /// Paths that begin at the vertices of this bounce.
+    pub branches: Vec<Branch>,
     /// Rays that stages have traced beside those of paths and shadow rays.
     pub counts: RayCounts,
 }
@@ -172,12 +175,7 @@ impl Wave {
     /// Starts a path with each camera sample.
     pub fn start(&mut self, context: &Context, samples: &CameraBatch) {
         self.count = samples.len();
-        let blocks = self.count.div_ceil(BATCH);
-        if self.paths.len() < blocks {
-            self.paths.resize_with(blocks, PathRows::default);
-            self.rays.resize_with(blocks, RayRows::default);
-            self.hits.resize_with(blocks, HitRows::default);
-        }
+        self.grow();
         for (block, CameraBlock { rays, requests, rr_scale }) in samples.blocks().iter().enumerate() {
             self.rays[block].clone_from(rays);
             self.paths[block].start(requests, rr_scale, block * BATCH);
@@ -209,6 +207,16 @@ impl Wave {
         self.shadows.count = 0;
         self.light_queue.reset();
         self.counts = RayCounts::default();
+    }
+
+    /// Makes room for all paths.
+    fn grow(&mut self) {
+        let blocks = self.blocks();
+        if self.paths.len() < blocks {
+            self.paths.resize_with(blocks, PathRows::default);
+            self.rays.resize_with(blocks, RayRows::default);
+            self.hits.resize_with(blocks, HitRows::default);
+        }
     }
 
     pub fn blocks(&self) -> usize {
@@ -282,9 +290,30 @@ impl Wave {
         survivors + lanes.len()
     }
 
-    /// Sets the intervals of the rays that go on.
-    pub fn finish_bounce(&mut self, survivors: usize) {
-        self.count = survivors;
+    /// Adds the paths that begin at vertices of others to the `survivors`, and sets the intervals of all rays.
+    pub fn finish_bounce(&mut self, context: &Context, survivors: usize) {
+        self.count = survivors + self.branches.len();
+        self.grow();
+        self.vertices.splits.is_split = [0; BATCH];
+        for i in survivors..self.count {
+            let Branch { path, ray, cone, lobes } = &self.branches[i - survivors];
+            self.paths[i / BATCH].set(i % BATCH, path);
+            self.rays[i / BATCH].set(i % BATCH, ray);
+            if let Some(cone) = *cone {
+                set_or_push(&mut self.cones, i, cone);
+            }
+            if context.pass.caustics.is_some() {
+                set_or_push(&mut self.caustics, i, CausticState::default());
+            }
+            if context.pass.light_paths.is_some() {
+                set_or_push(&mut self.connections, i, ConnectionState::default());
+            }
+            if context.scene.features.subsurface {
+                set_or_push(&mut self.walks, i, None);
+            }
+            self.light_aovs.start_branch(context, i, *lobes);
+        }
+        self.branches.clear();
         let blocks = self.blocks();
         for rays in &mut self.rays[..blocks] {
             (rays.t_min, rays.t_max) = ([0.0; BATCH], [f32::INFINITY; BATCH]);
@@ -391,6 +420,14 @@ impl Wave {
                 light_aovs.append(context, PathMove { from: path, to }, lobes, || vertices.feature_factor(lane));
             }
         }
+    }
+}
+
+/// Sets an element of a column, or appends it.
+pub(super) fn set_or_push<T>(column: &mut Vec<T>, i: usize, value: T) {
+    match column.get_mut(i) {
+        Some(element) => *element = value,
+        None => column.push(value),
     }
 }
 

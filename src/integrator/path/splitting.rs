@@ -1,0 +1,164 @@
+//! Splitting at smooth glass where its reflection probably shows an emitter.
+//!
+//! Choosing between reflection and refraction meets the emitter with the reflectance as the probability, a few in a
+//! hundred, and then the path is as bright as the emitter. Here the path always goes on through the glass, and a second
+//! path follows the reflection, [`REFLECTIONS`] times as often as it would be chosen. Only along paths that mirrors and
+//! glass alone have scattered, and in scenes with few emitters. `docs/performance.md` has what it brings.
+
+use super::block::{VertexRows, Vertices, vertex_flags};
+use super::wave::{BsdfScratch, Path, Wave, path_flags};
+use super::{Context, EmitterPrims};
+use crate::color::Rgb;
+use crate::geometry::SpawnPoint;
+use crate::integrator::light_events::LobeWeights;
+use crate::integrator::vertex::HemisphereTest;
+use crate::math::float::ONE_MINUS_EPSILON;
+use crate::math::rows::{BATCH, soa};
+use crate::math::{Ray, RayCone, Vec3, vec3};
+
+/// The number of reflected paths over that of paths which would choose the reflection.
+const REFLECTIONS: f32 = 10.0;
+
+/// The least throughput of both paths.
+const MIN_THROUGHPUT: f32 = 0.01;
+
+soa! {
+    /// Reflections at the vertices of a block.
+    pub(super) struct SplitRows {
+        /// Whether the path was split, so that it does not choose the reflection: 0 or 1.
+        is_split: u32,
+        /// The probability with which sampling the BSDF chooses the reflection.
+        pdf: f32,
+        /// Its direction, in the shading frame.
+        wi: Vec3,
+        /// The throughput of the reflection.
+        value: Rgb,
+        /// Its direction outside the glass, in the shading frame.
+        leaving: Vec3,
+    }
+}
+
+impl SplitRows {
+    /// The number that chooses a lobe, for a path that does not choose the reflection where it was split.
+    #[inline]
+    pub fn lobe_choice(&self, lane: usize, u_lobe: f32) -> f32 {
+        let pdf = self.pdf[lane];
+        if self.is_split[lane] == 0 { u_lobe } else { (pdf + u_lobe * (1.0 - pdf)).min(ONE_MINUS_EPSILON) }
+    }
+
+    /// The probability of what the path may choose at a vertex, for sampling the BSDF without regard to that.
+    #[inline]
+    pub fn remaining(&self, lane: usize) -> f32 {
+        if self.is_split[lane] == 0 { 1.0 } else { 1.0 - self.pdf[lane] }
+    }
+}
+
+/// A path that begins at a vertex of another, with the state of [`Wave`]'s optional columns.
+pub(super) struct Branch {
+    pub path: Path,
+    pub ray: Ray,
+    pub cone: Option<RayCone>,
+    pub lobes: LobeWeights,
+}
+
+/// Splits the paths of a block.
+pub(super) fn split(context: &Context, wave: &mut Wave, block: usize) {
+    wave.vertices.splits.is_split = [0; BATCH];
+    // Pilots attribute all that a sample finds later to each of its vertices.
+    let is_pilot = wave.continuations.is_enabled() || context.pass.guidance.has_moments;
+    let Some(emitters) = context.emitter_prims.filter(|_| !is_pilot) else { return };
+    let Wave { vertices, bsdf_rows, branches, cones, light_aovs, .. } = wave;
+    sample_reflections(context, vertices, bsdf_rows);
+    for &lane in &vertices.split_lanes {
+        let lane = usize::from(lane);
+        let pdf = vertices.splits.pdf[lane];
+        let throughput = vertices.rows.throughput.get(lane);
+        let largest = throughput.max_channel();
+        if largest * pdf.min(1.0 - pdf) < MIN_THROUGHPUT || !may_show(emitters, vertices, lane) {
+            continue;
+        }
+        vertices.splits.is_split[lane] = 1;
+        let probability = (REFLECTIONS * largest * pdf).min(1.0);
+        let ray = ray_along(vertices, lane, vertices.splits.wi.get(lane));
+        if vertices.u_bsdf.of(lane)[0] >= probability || !is_consistent(vertices, lane, &ray) {
+            continue;
+        }
+        let path = block * BATCH + vertices.path(lane);
+        branches.push(Branch {
+            path: reflected(vertices, lane, 1.0 / probability),
+            ray,
+            cone: cones
+                .get(path)
+                .map(|&cone| context.pass.render.scattered_cone(cone, vertices.rows.t[lane], f32::INFINITY)),
+            lobes: light_aovs.lobes(path).unwrap_or(LobeWeights::Reflected { diffuse: Rgb::BLACK }),
+        });
+    }
+}
+
+/// Finds the reflections of the vertices where paths may be split.
+fn sample_reflections(context: &Context, vertices: &mut Vertices, scratch: &mut BsdfScratch) {
+    let Vertices { rows, non_diffuse, bsdfs, splits, split_lanes, .. } = vertices;
+    split_lanes.clear();
+    split_lanes.extend(non_diffuse.iter().filter(|&&lane| can_be_split(rows, usize::from(lane))));
+    for lanes in bsdfs.groups(split_lanes) {
+        // Reflection is the first lobe, what crosses the last.
+        bsdfs.sample_group(context.scene, &rows.wo, lanes, |_| [0.0, 0.5, 0.5], scratch);
+        for (i, &lane) in lanes.iter().enumerate() {
+            let (lane, samples) = (usize::from(lane), &scratch.samples);
+            let is_reflection = samples.is_valid[i] != 0 && samples.is_transmission[i] == 0;
+            splits.pdf[lane] = if is_reflection { samples.pdf[i] } else { 0.0 };
+            splits.wi.set(lane, samples.wi.get(i));
+            splits.value.set(lane, samples.weight.get(i) * samples.pdf[i]);
+        }
+        bsdfs.sample_group(context.scene, &rows.wo, lanes, |_| [ONE_MINUS_EPSILON, 0.5, 0.5], scratch);
+        for (i, &lane) in lanes.iter().enumerate() {
+            let lane = usize::from(lane);
+            // Within a slab, what is reflected leaves it as the mirror image of what crosses.
+            let crossing = scratch.samples.wi.get(i);
+            let is_outside = rows.wo.0[2][lane] > 0.0;
+            let mirrored = vec3(crossing.x, crossing.y, -crossing.z);
+            splits.leaving.set(lane, if is_outside { splits.wi.get(lane) } else { mirrored });
+        }
+    }
+}
+
+/// Whether a vertex is on smooth glass and its path has met nothing but mirrors and such glass.
+fn can_be_split(rows: &VertexRows, lane: usize) -> bool {
+    const GLASS: u32 = vertex_flags::DELTA | vertex_flags::TRANSMITS;
+    rows.flags[lane] & GLASS == GLASS && rows.path_flags[lane] & path_flags::ANY_NON_SPECULAR == 0
+}
+
+/// Whether the reflection at a vertex may show an emitter, if all glass is in slabs with the directions of this one.
+fn may_show(emitters: &EmitterPrims, vertices: &Vertices, lane: usize) -> bool {
+    let ray = ray_along(vertices, lane, vertices.splits.leaving.get(lane));
+    emitters.boxes().any(|around| around.may_be_met(ray.origin, ray.direction))
+}
+
+fn ray_along(vertices: &Vertices, lane: usize, wi: Vec3) -> Ray {
+    let rows = &vertices.rows;
+    let start = SpawnPoint { p: vertices.points.p.get(lane), n: rows.n_g.get(lane), error: rows.error[lane] };
+    Ray { time: rows.time[lane], ..start.ray_along(vertices.frame(lane).to_world(wi)) }
+}
+
+/// Whether a ray along the reflection is on the same side of both normals.
+fn is_consistent(vertices: &Vertices, lane: usize, ray: &Ray) -> bool {
+    let rows = &vertices.rows;
+    let cos = ray.direction.dot(rows.n_g.get(lane));
+    let cos_local = vertices.splits.wi.0[2][lane];
+    HemisphereTest::new([rows.wo.0[2][lane], cos_local], [rows.cos_geometric[lane], cos]).agrees()
+}
+
+fn reflected(vertices: &Vertices, lane: usize, factor: f32) -> Path {
+    let Vertices { rows, points, splits, .. } = vertices;
+    Path {
+        throughput: rows.throughput.get(lane) * splits.value.get(lane) * factor,
+        pdf: splits.pdf[lane],
+        rr_scale: rows.rr_scale[lane],
+        flags: path_flags::SPECULAR,
+        slot: rows.slot[lane],
+        seed: rows.seed[lane],
+        sample: rows.sample[lane],
+        from_p: points.p.get(lane),
+        from_n: rows.light_context_n.get(lane),
+    }
+}
