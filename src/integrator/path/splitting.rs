@@ -109,15 +109,17 @@ fn sample_reflections(context: &Context, vertices: &mut Vertices, scratch: &mut 
             splits.pdf[lane] = if is_reflection { samples.pdf[i] } else { 0.0 };
             splits.wi.set(lane, samples.wi.get(i));
             splits.value.set(lane, samples.weight.get(i) * samples.pdf[i]);
+            splits.leaving.set(lane, samples.wi.get(i));
+        }
+        let is_inside = |lane: usize| rows.wo.0[2][lane] < 0.0;
+        if !lanes.iter().any(|&lane| is_inside(usize::from(lane))) {
+            continue;
         }
         bsdfs.sample_group(context.scene, &rows.wo, lanes, |_| [ONE_MINUS_EPSILON, 0.5, 0.5], scratch);
-        for (i, &lane) in lanes.iter().enumerate() {
-            let lane = usize::from(lane);
-            // Within a slab, what is reflected leaves it as the mirror image of what crosses.
+        for (i, lane) in lanes.iter().map(|&lane| usize::from(lane)).enumerate().filter(|&(_, lane)| is_inside(lane)) {
+            // What is reflected within a slab leaves it as the mirror image of what crosses.
             let crossing = scratch.samples.wi.get(i);
-            let is_outside = rows.wo.0[2][lane] > 0.0;
-            let mirrored = vec3(crossing.x, crossing.y, -crossing.z);
-            splits.leaving.set(lane, if is_outside { splits.wi.get(lane) } else { mirrored });
+            splits.leaving.set(lane, vec3(crossing.x, crossing.y, -crossing.z));
         }
     }
 }
