@@ -3,8 +3,8 @@
 //! A path that samples such a lobe finds the emitter with the probability of the lobe, a few in a hundred, and then is
 //! as bright as the emitter. In scenes with few emitters the lobe is evaluated in place of being chosen: its direction
 //! is known, so it is intersected with the emitters, and a shadow ray is traced to the closest one. Paths that do
-//! sample the lobe then leave out the emission they meet. Not for dielectrics: where reflection and refraction show the
-//! same light, choosing one of them has no variance. `docs/performance.md` has what it brings.
+//! sample the lobe then leave out the emission they meet. [`splitting`](super::splitting) is for dielectrics.
+//! `docs/performance.md` has what it brings.
 
 use super::block::{VertexRows, Vertices, vertex_flags};
 use super::direct::{self, Weighting};
