@@ -2,9 +2,9 @@
 //!
 //! A wave is one sample of every pixel of a tile. Each round of the main loop lengthens all its paths by a segment,
 //! stage by stage: trace, walks below surfaces, media, vertices, misses, materials, emission, splitting, direct light,
-//! scatter, shadow rays. Stages work on blocks of `BATCH` paths, whose state is in structures of arrays. Each path draws its
-//! random numbers from its own (pixel, sample, bounce), so a path is the same in any wave. "Vectorized Production Path
-//! Tracing" (Lee et al. 2017) has the idea, `docs/wavefront.md` the figures.
+//! scatter, shadow rays. Stages work on blocks of `BATCH` paths, whose state is in structures of arrays. Each path
+//! draws its random numbers from its own (pixel, sample, bounce), so a path is the same in any wave. "Vectorized
+//! Production Path Tracing" (Lee et al. 2017) has the idea, `docs/wavefront.md` the figures.
 
 mod adjoint;
 mod block;
