@@ -147,7 +147,7 @@ FEATURES = {
             ("src/integrator/path/{connection_mis.rs,connections.rs}", r"= context\.pass\.light_paths else", "= None::<&crate::integrator::LightPaths> else"),
         ],
     ),
-    "specular reflections of emitters": (
+    "specular reflections of emitters and splitting": (
         "`Context::emitter_prims`",
         [("src/integrator/path/mod.rs", r"specular_direct::emitters\(config, pass\)", "{ let _ = pass; None::<&EmitterPrims> }")],
     ),
