@@ -196,8 +196,6 @@ impl LightSet {
 }
 
 impl LightDistribution {
-    // Apart from the loops over lights of scenes without a tree, which it makes slower where it is inlined.
-    #[inline(never)]
     fn choose_by_tree(&self, tree: &LightTree, from: &LightSampleContext, u: [f32; 2]) -> Option<LightChoice> {
         // Random numbers are multiples of 2^-24.
         let u = f64::from(u[0]) + f64::from(u[1]) * (1.0 / 16_777_216.0);

@@ -1,9 +1,9 @@
 //! Splitting at smooth glass where its reflection probably shows an emitter.
 //!
 //! Choosing between reflection and refraction meets the emitter with the reflectance as the probability, a few in a
-//! hundred, and then the path is as bright as the emitter. Here the path always goes on through the glass, and a second
-//! path follows the reflection, [`REFLECTIONS`] times as often as it would be chosen. Only along paths that mirrors and
-//! glass alone have scattered, and in scenes with few emitters. `docs/performance.md` has what it brings.
+//! hundred, and then the path is as bright as the emitter. Here the path goes on through the glass, and a second path
+//! follows the reflection. Only along paths that mirrors and glass alone have scattered, and in scenes with few
+//! emitters. `docs/performance.md` has what it brings.
 
 use super::block::{VertexRows, Vertices, vertex_flags};
 use super::wave::{BsdfScratch, Path, Wave, path_flags};
@@ -15,9 +15,6 @@ use crate::integrator::vertex::HemisphereTest;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::rows::{BATCH, soa};
 use crate::math::{Ray, RayCone, Vec3, vec3};
-
-/// The number of reflected paths over that of paths which would choose the reflection.
-const REFLECTIONS: f32 = 10.0;
 
 /// The least throughput of both paths.
 const MIN_THROUGHPUT: f32 = 0.01;
@@ -73,19 +70,17 @@ pub(super) fn split(context: &Context, wave: &mut Wave, block: usize) {
         let lane = usize::from(lane);
         let pdf = vertices.splits.pdf[lane];
         let throughput = vertices.rows.throughput.get(lane);
-        let largest = throughput.max_channel();
-        if largest * pdf.min(1.0 - pdf) < MIN_THROUGHPUT || !may_show(emitters, vertices, lane) {
+        if throughput.max_channel() * pdf.min(1.0 - pdf) < MIN_THROUGHPUT || !may_show(emitters, vertices, lane) {
             continue;
         }
         vertices.splits.is_split[lane] = 1;
-        let probability = (REFLECTIONS * largest * pdf).min(1.0);
         let ray = ray_along(vertices, lane, vertices.splits.wi.get(lane));
-        if vertices.u_bsdf.of(lane)[0] >= probability || !is_consistent(vertices, lane, &ray) {
+        if !is_consistent(vertices, lane, &ray) {
             continue;
         }
         let path = block * BATCH + vertices.path(lane);
         branches.push(Branch {
-            path: reflected(vertices, lane, 1.0 / probability),
+            path: reflected(vertices, lane),
             ray,
             cone: cones
                 .get(path)
@@ -150,10 +145,10 @@ fn is_consistent(vertices: &Vertices, lane: usize, ray: &Ray) -> bool {
     HemisphereTest::new([rows.wo.0[2][lane], cos_local], [rows.cos_geometric[lane], cos]).agrees()
 }
 
-fn reflected(vertices: &Vertices, lane: usize, factor: f32) -> Path {
+fn reflected(vertices: &Vertices, lane: usize) -> Path {
     let Vertices { rows, points, splits, .. } = vertices;
     Path {
-        throughput: rows.throughput.get(lane) * splits.value.get(lane) * factor,
+        throughput: rows.throughput.get(lane) * splits.value.get(lane),
         pdf: splits.pdf[lane],
         rr_scale: rows.rr_scale[lane],
         flags: path_flags::SPECULAR,
