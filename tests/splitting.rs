@@ -39,7 +39,7 @@ fn rendered(scene: &Value, strategy: StrategyDesc, seed: u64) -> Image {
     render_with(&prepare(scene, &overrides), AccelKind::EMBREE).image
 }
 
-/// By Welch's test on blocks of pixels. The strategy `light` chooses.
+/// By Welch's test on blocks of pixels. With the strategy `light` paths are not split.
 #[test]
 fn split_paths_and_those_that_choose_have_the_same_mean() {
     let blocks = |scene: &Value, strategy, first: u64| -> Vec<Vec<f64>> {
@@ -55,7 +55,7 @@ fn split_paths_and_those_that_choose_have_the_same_mean() {
     }
 }
 
-/// Before a black wall all noise is of the choice. Two renders differ by twice the variance of one.
+/// Before a black wall all noise is that of choosing reflection or refraction. Two renders differ by twice the variance of one.
 #[test]
 fn split_paths_have_less_noise() {
     let difference = |strategy| -> f64 {

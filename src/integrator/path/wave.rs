@@ -294,6 +294,7 @@ impl Wave {
     pub fn finish_bounce(&mut self, context: &Context, survivors: usize) {
         self.count = survivors + self.branches.len();
         self.grow();
+        // Waves of photons and of light paths do not split, and share this state.
         self.vertices.splits.is_split = [0; BATCH];
         for i in survivors..self.count {
             let Branch { path, ray, cone, lobes } = &self.branches[i - survivors];
