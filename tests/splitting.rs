@@ -55,7 +55,8 @@ fn split_paths_and_those_that_choose_have_the_same_mean() {
     }
 }
 
-/// Before a black wall all noise is that of choosing reflection or refraction. Two renders differ by twice the variance of one.
+/// Before a black wall all noise is that of choosing reflection or refraction. Two renders differ by twice the variance
+/// of one.
 #[test]
 fn split_paths_have_less_noise() {
     let difference = |strategy| -> f64 {
