@@ -39,7 +39,7 @@ fn agree(
             let found = accel.intersect(ray);
             assert_eq!(found.is_some(), accel.occluded(ray), "{kind}: {ray:?}");
             match kind {
-                AccelKind::Embree(_) | AccelKind::Hybrid => {
+                AccelKind::Embree(_) | AccelKind::Hybrid(_) => {
                     different += usize::from(found.map(|h| h.prim) != expected.map(|h| h.prim));
                 }
                 _ => assert_eq!(found, *expected, "{kind}: {ray:?}"),

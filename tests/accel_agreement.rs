@@ -1,7 +1,9 @@
 //! Embree, alone and beside packets, answers alike for single rays, in batches and from many threads.
 
-use steradian::internal::accel::{AccelKind, Accelerator, Coherence, EmbreeAccel, EmbreeInfo, HybridAccel, build};
-use steradian::internal::geometry::{Analytic, Geometry, Shape};
+use steradian::internal::accel::{
+    AccelKind, Accelerator, BvhOptions, Coherence, EmbreeAccel, EmbreeInfo, HybridAccel, HybridOptions, build,
+};
+use steradian::internal::geometry::{Analytic, Geometry, Mesh, Shape};
 use steradian::internal::math::DVec3;
 
 use crate::util::geometry::{Rng, instances, meshes, placed_analytic_shapes, soup, transform, world};
@@ -13,7 +15,7 @@ fn embree(geometry: &Geometry) -> EmbreeAccel<'_> {
 
 #[test]
 fn packets_answer_as_single_rays_do() {
-    let kinds = [AccelKind::EMBREE, AccelKind::Hybrid];
+    let kinds = [AccelKind::EMBREE, AccelKind::HYBRID, AccelKind::HYBRID_BVH];
     for ((name, geometry), kind) in scenes().iter().flat_map(|scene| kinds.map(|kind| (scene, kind))) {
         let accel = build(kind, geometry, 1).expect("it builds");
         let rays = camera_rays(geometry, 128);
@@ -38,7 +40,7 @@ fn packets_answer_as_single_rays_do() {
 #[test]
 fn incoherent_batches_equal_single_rays_bit_for_bit() {
     let mut rng = Rng::new(15);
-    let kinds = [AccelKind::EMBREE, AccelKind::Hybrid];
+    let kinds = [AccelKind::EMBREE, AccelKind::HYBRID, AccelKind::Bvh(BvhOptions::default())];
     for ((name, geometry), kind) in scenes().iter().flat_map(|scene| kinds.map(|kind| (scene, kind))) {
         let accel = build(kind, geometry, 1).expect("it builds");
         let rays = test_rays(&mut rng, geometry, 5_001);
@@ -82,7 +84,7 @@ fn shapes_in_packets_are_hit_where_embree_hits_them() {
     let mut shapes = placed_analytic_shapes(&mut rng, DVec3::ZERO);
     shapes.push(Shape::Mesh(soup(&mut rng, 2_000, 0.1)));
     let geometry = world(shapes);
-    let (hybrid, embree) = (HybridAccel::new(&geometry, 1).expect("it builds"), embree(&geometry));
+    let (hybrid, embree) = (HybridAccel::new(&geometry, 1, HybridOptions::default()).expect("it builds"), embree(&geometry));
     assert!(hybrid.description().contains("packets"), "{}", hybrid.description());
     let rays = test_rays(&mut rng, &geometry, 20_000);
     let (mut hits, mut occluded) = (vec![None; rays.len()], vec![false; rays.len()]);
@@ -110,10 +112,48 @@ fn few_analytic_shapes_beside_many_triangles_are_traced_in_packets() {
         let shapes = std::iter::repeat_n(quad.clone(), count).chain([mesh.clone()]).collect();
         build(AccelKind::Auto, &world(shapes), 1).expect("it builds").description()
     };
-    assert!(beside(1, &mesh).contains("1 analytic") && beside(16, &mesh).contains("16 analytic"));
+    assert!(beside(1, &mesh).contains("for 1 shapes") && beside(16, &mesh).contains("for 16 shapes"));
     assert!(!beside(0, &mesh).contains("packets") && !beside(17, &mesh).contains("packets"));
+    // Meshes at rest are in the BVH, where the machine has the instructions that make it fast.
+    let is_bvh = std::arch::is_x86_feature_detected!("avx2");
+    assert_eq!(beside(0, &mesh).starts_with("BVH"), is_bvh);
+    assert!(beside(17, &mesh).starts_with("Embree"));
     let inside = instances(vec![quad.clone(), mesh], &[transform(rng.rotation(), rng.cube())]);
-    assert!(!build(AccelKind::Auto, &inside, 1).expect("it builds").description().contains("packets"));
+    assert!(build(AccelKind::Auto, &inside, 1).expect("it builds").description().starts_with("Embree"));
+}
+
+#[test]
+fn floors_and_walls_are_hit_where_the_oracle_hits_them() {
+    let mut rng = Rng::new(20);
+    let wall = |axis: usize, side: f64| {
+        let corner = |u: f64, v: f64| {
+            let mut p = [0.0; 3];
+            (p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]) = (side, u, v);
+            p.map(|x| x as f32)
+        };
+        let corners = vec![corner(-2.0, -2.0), corner(2.0, -2.0), corner(2.0, 2.0), corner(-2.0, 2.0)];
+        Mesh::new(corners, vec![[0, 1, 2], [0, 2, 3]], None, None).expect("it is valid")
+    };
+    let walls = (0..3).flat_map(|axis| [-2.0, 2.0].map(|side| (axis, side))).map(|(axis, side)| wall(axis, side));
+    let geometry = meshes(walls.chain([soup(&mut rng, 2_000, 0.1)]).collect());
+    let accel = build(AccelKind::HYBRID_BVH, &geometry, 1).expect("it builds");
+    assert!(accel.description().contains("for 6 shapes"), "{}", accel.description());
+    let oracle = build(AccelKind::Linear, &geometry, 1).expect("it builds");
+    let rays = test_rays(&mut rng, &geometry, 20_000);
+    let (mut hits, mut occluded) = (vec![None; rays.len()], vec![false; rays.len()]);
+    accel.intersect_batch(&rays, &mut hits, Coherence::Incoherent);
+    accel.occluded_batch(&rays, &mut occluded, Coherence::Incoherent);
+    let mut on_walls = 0;
+    for ((ray, hit), occluded) in rays.iter().zip(hits).zip(occluded) {
+        let expected = oracle.intersect(ray);
+        assert_eq!((hit.is_some(), occluded), (expected.is_some(), expected.is_some()), "{ray:?}");
+        assert_eq!((accel.intersect(ray), accel.occluded(ray)), (expected, expected.is_some()), "{ray:?}");
+        if let (Some(a), Some(b)) = (&hit, &expected) {
+            assert!(same(&geometry, ray, a, b), "{a:?} is not {b:?}");
+            on_walls += usize::from(a.shape.index() < 6);
+        }
+    }
+    assert!(on_walls > 1_000, "{on_walls}");
 }
 
 #[test]

@@ -1,8 +1,10 @@
-//! Embree for meshes, and packets for the analytic shapes that stand in the world: a few of them cost less than a
-//! second hierarchy in Embree with a callback for each.
+//! Packets for analytic shapes of the world, and Embree or the BVH for all else: a few shapes cost less that way than a
+//! second hierarchy in Embree with a callback for each. Beside the BVH, floors and walls are in packets too.
 
+use super::bvh::{Bvh, BvhOptions};
 use super::embree::{EmbreeAccel, EmbreeOptions};
 use super::packet::{Hierarchy, has_intervals};
+use super::tree::TwoLevel;
 use super::{Accelerator, Coherence, HitRows, intersect_in_rows};
 use crate::error::Result;
 use crate::geometry::{Geometry, Hit, Shape};
@@ -13,9 +15,29 @@ use crate::math::{Aabb, Ray, RayRows};
 /// Up to this number of analytic shapes, packets beside Embree are mostly faster (`docs/accelerators.md`).
 const FEW: usize = 16;
 
-/// Embree, and a hierarchy for packets over the spheres, cylinders, disks and quads of the world that have no holes.
+/// The most triangles of a mesh that is traced in packets.
+const MAX_PANEL: usize = 48;
+
+/// The most triangles of all such meshes.
+const MAX_PANELS: usize = 80;
+
+/// The least area of the box around such a mesh, in areas of the box around the world.
+const MIN_PANEL_AREA: f32 = 0.02;
+
+/// Above this number of triangles, Embree's shorter build outweighs what the BVH saves.
+const MAX_TRIANGLES: usize = 2_000_000;
+
+/// What traces what is not in packets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct HybridOptions {
+    /// The bounding volume hierarchy of this crate in place of Embree.
+    pub bvh: bool,
+}
+
+/// A hierarchy for packets over the spheres, cylinders, disks and quads of the world that have no holes, and Embree or
+/// the BVH.
 pub struct HybridAccel<'g> {
-    embree: EmbreeAccel<'g>,
+    others: Box<dyn Accelerator + 'g>,
     /// In packets.
     shapes: Vec<ShapeId>,
     /// `None` without such shapes.
@@ -28,21 +50,34 @@ impl<'g> HybridAccel<'g> {
     ///
     /// # Errors
     /// As [`EmbreeAccel::new`].
-    pub fn new(geometry: &'g Geometry, threads: usize) -> Result<Self> {
+    pub fn new(geometry: &'g Geometry, threads: usize, options: HybridOptions) -> Result<Self> {
+        let panels = if options.bvh { panels(geometry) } else { Vec::new() };
         let (mut shapes, mut others): (Vec<_>, Vec<_>) =
-            geometry.world.iter().partition(|&&id| is_traced_in_packets(geometry, id));
+            geometry.world.iter().partition(|&&id| is_traced_in_packets(geometry, id) || panels.contains(&id));
         let packets = Hierarchy::new(geometry, &shapes, &geometry.bounds());
         if packets.is_none() {
             others.append(&mut shapes);
         }
-        let embree = EmbreeAccel::over(geometry, &others, threads, EmbreeOptions::default())?;
-        Ok(Self { embree, shapes, packets, geometry })
+        let others: Box<dyn Accelerator + 'g> = if options.bvh {
+            Box::new(TwoLevel::<Bvh>::over(geometry, &others, &BvhOptions::default(), threads))
+        } else {
+            Box::new(EmbreeAccel::over(geometry, &others, threads, EmbreeOptions::default())?)
+        };
+        Ok(Self { others, shapes, packets, geometry })
     }
 
-    /// Whether this is faster than Embree alone for `geometry`.
-    pub fn suits(geometry: &Geometry) -> bool {
-        let count = geometry.world.iter().filter(|&&id| is_traced_in_packets(geometry, id)).count();
-        (1..=FEW).contains(&count)
+    /// What is faster than Embree alone for `geometry`, if anything is.
+    pub fn suiting(geometry: &Geometry) -> Option<HybridOptions> {
+        let (in_packets, others): (Vec<ShapeId>, Vec<ShapeId>) =
+            geometry.world.iter().partition(|&&id| is_traced_in_packets(geometry, id));
+        let in_packets = in_packets.len();
+        let triangles: usize = others.iter().map(|&id| geometry.shape(id).prim_count()).sum();
+        let bvh = Bvh::is_vectorized()
+            && geometry.instances.is_empty()
+            && others.iter().all(|&id| is_resting_mesh(geometry.shape(id)))
+            && in_packets <= FEW
+            && (1..=MAX_TRIANGLES).contains(&triangles);
+        (bvh || (1..=FEW).contains(&in_packets)).then_some(HybridOptions { bvh })
     }
 
     /// The closest hit of one ray on the shapes in packets.
@@ -52,8 +87,8 @@ impl<'g> HybridAccel<'g> {
             return None;
         }
         let mut closest = None;
-        for &id in &self.shapes {
-            if let Some(hit) = self.geometry.shape(id).intersect_prim(&ray, id, PrimId(0)) {
+        for (id, prim) in self.prims() {
+            if let Some(hit) = self.geometry.shape(id).intersect_prim(&ray, id, prim) {
                 ray.t_max = hit.t;
                 closest = Some(hit);
             }
@@ -61,10 +96,14 @@ impl<'g> HybridAccel<'g> {
         closest
     }
 
+    /// The primitives in packets.
+    fn prims(&self) -> impl Iterator<Item = (ShapeId, PrimId)> {
+        self.shapes.iter().flat_map(|&id| (0..self.geometry.shape(id).prim_count()).map(move |i| (id, PrimId::new(i))))
+    }
+
     /// Whether one ray hits any of the shapes in packets.
     fn occluded_by_shapes(&self, ray: &Ray) -> bool {
-        let hits = |id: &ShapeId| self.geometry.shape(*id).intersect_prim(ray, *id, PrimId(0)).is_some();
-        ray.is_valid() && self.shapes.iter().any(hits)
+        ray.is_valid() && self.prims().any(|(id, prim)| self.geometry.shape(id).intersect_prim(ray, id, prim).is_some())
     }
 }
 
@@ -74,27 +113,52 @@ fn is_traced_in_packets(geometry: &Geometry, id: ShapeId) -> bool {
         && !geometry.cutouts.has_holes(id)
 }
 
+/// Whether a shape is a mesh that does not deform.
+fn is_resting_mesh(shape: &Shape) -> bool {
+    matches!(shape, Shape::Mesh(mesh) if !mesh.is_deforming())
+}
+
+/// Floors and walls: the largest meshes of few triangles, which rays of all directions meet.
+fn panels(geometry: &Geometry) -> Vec<ShapeId> {
+    let area = |id: ShapeId| geometry.shape(id).bounds().area();
+    let min_area = MIN_PANEL_AREA * geometry.bounds().area();
+    let is_panel = |id: &ShapeId| {
+        is_resting_mesh(geometry.shape(*id))
+            && geometry.shape(*id).prim_count() <= MAX_PANEL
+            && area(*id) > min_area
+            && !geometry.cutouts.has_holes(*id)
+    };
+    let mut panels: Vec<ShapeId> = geometry.world.iter().copied().filter(is_panel).collect();
+    panels.sort_by(|&a, &b| area(b).total_cmp(&area(a)));
+    let mut triangles = 0;
+    panels.retain(|&id| {
+        triangles += geometry.shape(id).prim_count();
+        triangles <= MAX_PANELS
+    });
+    panels
+}
+
 impl Accelerator for HybridAccel<'_> {
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let on_shape = self.intersect_shapes(ray);
         let rest = Ray { t_max: on_shape.map_or(ray.t_max, |hit| hit.t), ..*ray };
-        match (self.embree.intersect(&rest), on_shape) {
+        match (self.others.intersect(&rest), on_shape) {
             (Some(hit), Some(on_shape)) if hit.t >= on_shape.t => Some(on_shape),
             (hit, on_shape) => hit.or(on_shape),
         }
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        self.occluded_by_shapes(ray) || self.embree.occluded(ray)
+        self.occluded_by_shapes(ray) || self.others.occluded(ray)
     }
 
     fn intersect_rows(&self, rays: &RayRows, count: usize, hits: &mut HitRows, coherence: Coherence) {
-        let Some(packets) = &self.packets else { return self.embree.intersect_rows(rays, count, hits, coherence) };
+        let Some(packets) = &self.packets else { return self.others.intersect_rows(rays, count, hits, coherence) };
         let count = count.min(BATCH);
         let (mut on_shapes, mut ends) = (HitRows::default(), [0.0; BATCH]);
         packets.intersect_within(rays, count, &mut on_shapes, &mut ends, |ray| self.intersect_shapes(ray));
         if on_shapes.shape[..count].iter().all(|&shape| shape == HitRows::MISS) {
-            return self.embree.intersect_rows(rays, count, hits, coherence);
+            return self.others.intersect_rows(rays, count, hits, coherence);
         }
         let mut rest = rays.clone();
         for (lane, &end) in ends[..count].iter().enumerate() {
@@ -102,7 +166,7 @@ impl Accelerator for HybridAccel<'_> {
                 rest.t_max[lane] = end;
             }
         }
-        self.embree.intersect_rows(&rest, count, hits, coherence);
+        self.others.intersect_rows(&rest, count, hits, coherence);
         for lane in 0..count {
             let Some(hit) = on_shapes.get(lane) else { continue };
             // Within the limits of the distance to the shape, that in `f64` decides.
@@ -117,12 +181,16 @@ impl Accelerator for HybridAccel<'_> {
 
     fn occluded_rows(&self, rays: &RayRows, count: usize, occluded: &mut [bool; BATCH], coherence: Coherence) {
         let Some(packets) = &self.packets else {
-            return self.embree.occluded_rows(rays, count, occluded, coherence);
+            return self.others.occluded_rows(rays, count, occluded, coherence);
         };
         let count = count.min(BATCH);
         let mut by_shapes = [false; BATCH];
         packets.occluded(rays, count, &mut by_shapes, |ray| self.occluded_by_shapes(ray));
-        self.embree.occluded_rows(rays, count, occluded, coherence);
+        let mut rest = rays.clone();
+        for (t_max, is_occluded) in rest.t_max.iter_mut().zip(by_shapes).take(count) {
+            *t_max = if is_occluded { -1.0 } else { *t_max };
+        }
+        self.others.occluded_rows(&rest, count, occluded, coherence);
         occluded[..count].iter_mut().zip(by_shapes).for_each(|(occluded, by_shape)| *occluded |= by_shape);
     }
 
@@ -134,17 +202,17 @@ impl Accelerator for HybridAccel<'_> {
     }
 
     fn bounds(&self) -> Aabb {
-        self.embree.bounds()
+        self.others.bounds()
     }
 
     fn memory_bytes(&self) -> usize {
-        self.embree.memory_bytes() + self.packets.as_ref().map_or(0, Hierarchy::memory_bytes)
+        self.others.memory_bytes() + self.packets.as_ref().map_or(0, Hierarchy::memory_bytes)
     }
 
     fn description(&self) -> String {
         match self.shapes.len() {
-            0 => self.embree.description(),
-            count => format!("{}, packets of rays for {count} analytic shapes", self.embree.description()),
+            0 => self.others.description(),
+            count => format!("{}, packets of rays for {count} shapes", self.others.description()),
         }
     }
 }

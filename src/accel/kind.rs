@@ -9,7 +9,7 @@ use super::bvh::{Bvh, BvhOptions};
 use super::kdtree::{KdTree, KdTreeOptions};
 use super::octree::Octree;
 use super::tree::TwoLevel;
-use super::{Accelerator, EmbreeAccel, EmbreeOptions, EmbreeQuality, HybridAccel, LinearAccel, PacketBvh};
+use super::{Accelerator, EmbreeAccel, EmbreeOptions, EmbreeQuality, HybridAccel, HybridOptions, LinearAccel, PacketBvh};
 use crate::error::Result;
 use crate::geometry::Geometry;
 
@@ -29,7 +29,7 @@ pub enum AccelKind {
     /// A bounding volume hierarchy for packets of rays.
     Packets,
     /// Embree, and a bounding volume hierarchy for packets of rays over analytic shapes of the world.
-    Hybrid,
+    Hybrid(HybridOptions),
     /// A kd-tree.
     KdTree(KdTreeOptions),
     /// An octree.
@@ -43,6 +43,12 @@ impl AccelKind {
     pub const EMBREE: Self =
         Self::Embree(EmbreeOptions { quality: EmbreeQuality::Medium, robust: true, compact: false });
 
+    /// Embree with packets for analytic shapes.
+    pub const HYBRID: Self = Self::Hybrid(HybridOptions { bvh: false });
+
+    /// The BVH with packets for analytic shapes, floors and walls.
+    pub const HYBRID_BVH: Self = Self::Hybrid(HybridOptions { bvh: true });
+
     /// Every structure with default options, with the name users choose it by.
     pub const ALL: [(Self, &'static str); 7] = [
         (Self::EMBREE, "embree"),
@@ -51,7 +57,7 @@ impl AccelKind {
         (Self::Octree, "octree"),
         (Self::Linear, "linear"),
         (Self::Packets, "packets"),
-        (Self::Hybrid, "hybrid"),
+        (Self::HYBRID, "hybrid"),
     ];
 
     /// Every kind and every option, with what it is.
@@ -68,6 +74,7 @@ impl AccelKind {
         ("embree:compact", "less memory, traced slower"),
         ("packets", "bounding volume hierarchy traversed by up to 16 rays at once: fastest for few primitives"),
         ("hybrid", "embree, with packets for spheres, cylinders, disks and quads that have no holes"),
+        ("hybrid:bvh", "bvh in place of embree"),
         ("bvh", "bounding volume hierarchy: binned surface area heuristic, eight boxes a node, SIMD"),
         ("bvh:binary", "two boxes a node, no SIMD"),
         ("kdtree", "kd-tree: surface area heuristic with a bonus for empty space"),
@@ -91,7 +98,7 @@ impl fmt::Display for AccelKind {
             }
             Self::Auto => ("auto", Vec::new()),
             Self::Packets => ("packets", Vec::new()),
-            Self::Hybrid => ("hybrid", Vec::new()),
+            Self::Hybrid(o) => ("hybrid", o.bvh.then_some("bvh").into_iter().collect()),
             Self::Bvh(o) => {
                 let flags = [o.binary.then_some("binary")];
                 ("bvh", flags.into_iter().flatten().collect())
@@ -137,6 +144,7 @@ impl FromStr for AccelKind {
                 (Self::Embree(o), "fast") => o.robust = false,
                 (Self::Embree(o), "compact") => o.compact = true,
                 (Self::Bvh(o), "binary") => o.binary = true,
+                (Self::Hybrid(o), "bvh") => o.bvh = true,
                 (Self::KdTree(o), "median") => o.median = true,
                 _ => return Err(unknown()),
             }
@@ -166,11 +174,13 @@ impl TryFrom<String> for AccelKind {
 pub fn build(kind: AccelKind, geometry: &Geometry, threads: usize) -> Result<Box<dyn Accelerator + '_>> {
     Ok(match kind {
         AccelKind::Auto if PacketBvh::suits(geometry) => Box::new(PacketBvh::new(geometry, threads)),
-        AccelKind::Auto if HybridAccel::suits(geometry) => Box::new(HybridAccel::new(geometry, threads)?),
-        AccelKind::Auto => build(AccelKind::EMBREE, geometry, threads)?,
+        AccelKind::Auto => {
+            let kind = HybridAccel::suiting(geometry).map_or(AccelKind::EMBREE, AccelKind::Hybrid);
+            build(kind, geometry, threads)?
+        }
         AccelKind::Embree(options) => Box::new(EmbreeAccel::with_options(geometry, threads, options)?),
         AccelKind::Packets => Box::new(PacketBvh::new(geometry, threads)),
-        AccelKind::Hybrid => Box::new(HybridAccel::new(geometry, threads)?),
+        AccelKind::Hybrid(options) => Box::new(HybridAccel::new(geometry, threads, options)?),
         AccelKind::Bvh(options) => Box::new(TwoLevel::<Bvh>::new(geometry, &options, threads)),
         AccelKind::KdTree(options) => Box::new(TwoLevel::<KdTree>::new(geometry, &options, threads)),
         AccelKind::Octree => Box::new(TwoLevel::<Octree>::new(geometry, &(), threads)),

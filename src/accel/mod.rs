@@ -16,7 +16,7 @@ pub use bvh::BvhOptions;
 pub use embree::EmbreeReplay;
 pub use embree::Registered;
 pub use embree::{EmbreeAccel, EmbreeInfo, EmbreeOptions, EmbreeQuality, on_uncaught_exception};
-pub use hybrid::HybridAccel;
+pub use hybrid::{HybridAccel, HybridOptions};
 pub use kdtree::KdTreeOptions;
 pub use kind::{AccelKind, UnknownAccel, build};
 pub use linear::LinearAccel;

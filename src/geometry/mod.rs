@@ -50,7 +50,7 @@ pub use sector::Sector;
 pub use shape_error::ShapeError;
 pub use sphere::Sphere;
 pub(crate) use tangents::corner_tangents;
-pub use triangle::{TriangleHit, TriangleIntersection, TriangleRay, TriangleSample};
+pub use triangle::{Shear, ShearRows, TriangleHit, TriangleIntersection, TriangleRay, TriangleSample, largest_axis};
 
 pub(crate) use uv::{interpolated_uv, uv_area, uv_density};
 

@@ -5,7 +5,8 @@
 //! triangles, so no ray passes between them.
 
 use crate::math::float::UNIT_ROUNDOFF;
-use crate::math::{Aabb, DVec3, Ray, RayF64, Vec3};
+use crate::math::rows::soa;
+use crate::math::{Aabb, DVec3, Ray, Vec3};
 use crate::sampling::warp;
 
 /// The corners of one triangle. The front is where they appear counter-clockwise.
@@ -138,23 +139,55 @@ impl TrianglePoints {
     }
 }
 
+soa! {
+    /// The shear that puts a ray's direction onto the axis `kz` along which it is largest; `kx` and `ky` are the axes
+    /// after it, in cyclic order.
+    pub struct ShearRows of Shear {
+        /// The direction's component along `kx` over that along `kz`.
+        sx: f64,
+        /// The direction's component along `ky` over that along `kz`.
+        sy: f64,
+        /// The direction's component along `kz`.
+        dz: f64,
+        /// Where `t = 0`: along `kx`, `ky` and `kz`.
+        origin: DVec3,
+    }
+}
+
+impl Shear {
+    /// The shear of a ray along this `kz`.
+    #[inline(always)]
+    pub fn new(origin: Vec3, direction: Vec3, kz: u32) -> Self {
+        let [x, y, dz] = permuted(direction, kz).map(f64::from);
+        Self { sx: x / dz, sy: y / dz, dz, origin: permuted(origin, kz).map(f64::from).into() }
+    }
+}
+
+/// The axis along which a direction is largest.
+#[inline(always)]
+pub fn largest_axis(direction: Vec3) -> u32 {
+    let size = direction.abs();
+    let of_others = if size.y > size.z { 1 } else { 2 };
+    if (size.x > size.y) & (size.x > size.z) { 0 } else { of_others }
+}
+
+/// The components along `kx`, `ky` and `kz`, without branches.
+#[inline(always)]
+fn permuted(v: Vec3, kz: u32) -> [f32; 3] {
+    let choose = |of_0, of_1, of_2| {
+        let of_others = if kz == 1 { of_1 } else { of_2 };
+        if kz == 0 { of_0 } else { of_others }
+    };
+    [choose(v.y, v.z, v.x), choose(v.z, v.x, v.y), choose(v.x, v.y, v.z)]
+}
+
 /// A ray prepared for many triangles.
 #[derive(Clone, Copy, Debug)]
 pub struct TriangleRay {
-    /// The axis along which the direction is largest, and the two after it in cyclic order.
-    pub kz: usize,
-    /// The first axis after `kz`.
-    pub kx: usize,
-    /// The second axis after `kz`.
-    pub ky: usize,
-    /// The direction's component along `kx` over that along `kz`.
-    pub sx: f64,
-    /// The direction's component along `ky` over that along `kz`.
-    pub sy: f64,
-    /// The direction's component along `kz`.
-    pub dz: f64,
-    /// Where `t = 0`.
-    pub origin: DVec3,
+    /// The axis along which the direction is largest.
+    pub kz: u32,
+    /// How the ray is put onto that axis.
+    pub shear: Shear,
     /// Smallest accepted `t`, inclusive.
     pub t_min: f64,
     /// Largest accepted `t`, inclusive.
@@ -164,32 +197,31 @@ pub struct TriangleRay {
 impl From<&Ray> for TriangleRay {
     #[inline]
     fn from(ray: &Ray) -> Self {
-        let RayF64 { origin, direction: d, t_min, t_max } = RayF64::from(ray);
-        let size = d.abs();
-        let kz = if size.x > size.y {
-            if size.x > size.z { 0 } else { 2 }
-        } else if size.y > size.z {
-            1
-        } else {
-            2
-        };
-        let (kx, ky) = ((kz + 1) % 3, (kz + 2) % 3);
-        Self { kz, kx, ky, sx: d[kx] / d[kz], sy: d[ky] / d[kz], dz: d[kz], origin, t_min, t_max }
+        let kz = largest_axis(ray.direction);
+        let shear = Shear::new(ray.origin, ray.direction, kz);
+        Self { kz, shear, t_min: ray.t_min.into(), t_max: ray.t_max.into() }
     }
 }
 
 impl TriangleRay {
+    /// The axes `kx`, `ky` and `kz`.
+    #[inline(always)]
+    pub fn axes(&self) -> [usize; 3] {
+        const AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
+        AXES[(self.kz as usize).min(2)]
+    }
+
     /// The hit within the ray's interval, with either side up.
     #[inline]
     pub fn intersect(&self, triangle: &TrianglePoints) -> Option<TriangleHit> {
-        let Self { kx, ky, kz, sx, sy, dz, .. } = *self;
+        let Self { kz, shear: Shear { sx, sy, dz, origin }, .. } = *self;
 
         // Corners relative to the origin (exact differences of f32 up to one rounding), sheared.
-        let corner = |p: Vec3| p.as_dvec3() - self.origin;
-        let (a, b, c) = (corner(triangle.a), corner(triangle.b), corner(triangle.c));
-        let (ax, ay) = (a[kx] - sx * a[kz], a[ky] - sy * a[kz]);
-        let (bx, by) = (b[kx] - sx * b[kz], b[ky] - sy * b[kz]);
-        let (cx, cy) = (c[kx] - sx * c[kz], c[ky] - sy * c[kz]);
+        let corner = |p: Vec3| {
+            let p = DVec3::from(permuted(p, kz).map(f64::from)) - origin;
+            (p.x - sx * p.z, p.y - sy * p.z, p.z)
+        };
+        let ((ax, ay, az), (bx, by, bz), (cx, cy, cz)) = (corner(triangle.a), corner(triangle.b), corner(triangle.c));
 
         // Edge functions; a point on an edge belongs to both neighbours.
         let u = cx * by - cy * bx;
@@ -202,7 +234,7 @@ impl TriangleRay {
         if determinant == 0.0 {
             return None;
         }
-        let t = (u * a[kz] + v * b[kz] + w * c[kz]) / (determinant * dz);
+        let t = (u * az + v * bz + w * cz) / (determinant * dz);
         let contained = self.t_min <= t && t <= self.t_max;
         contained.then(|| TriangleHit { t: t as f32, u: (v / determinant) as f32, v: (w / determinant) as f32 })
     }

@@ -90,7 +90,7 @@ fn store_parts<T, const N: usize, const PARTS: usize>(
 }
 
 /// The lanes whose bits are set in the index, a byte each.
-const ORDER_OF_8: [u64; 256] = order(1);
+pub const ORDER_OF_8: [u64; 256] = order(1);
 /// The halves of lanes of twice the width.
 const ORDER_OF_4: [u64; 16] = order(2);
 

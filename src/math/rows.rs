@@ -190,11 +190,13 @@ macro_rules! soa {
 
         #[allow(dead_code)]
         impl $rows {
+            /// The element of a lane.
             #[inline(always)]
             $vis fn get(&self, i: usize) -> $item {
                 $item { $($field: <$type as $crate::math::rows::Element>::get(&self.$field, i),)* }
             }
 
+            /// Sets the element of a lane.
             #[inline(always)]
             $vis fn set(&mut self, i: usize, item: &$item) {
                 $(<$type as $crate::math::rows::Element>::set(&mut self.$field, i, item.$field);)*

@@ -450,7 +450,7 @@ fn work_per_ray(inspect: &dyn Inspect, rays: &[Ray], any_hit: bool) -> [f64; 2] 
 fn modes(kind: RayKind, accel: &str) -> &'static [Mode] {
     match (accel.split(':').next(), kind) {
         (Some("auto" | "embree" | "hybrid"), RayKind::Camera) => &[Mode::Single, Mode::Batch, Mode::CoherentBatch],
-        (Some("auto" | "embree" | "hybrid" | "packets"), _) => &[Mode::Single, Mode::Batch],
+        (Some("auto" | "embree" | "hybrid" | "packets" | "bvh"), _) => &[Mode::Single, Mode::Batch],
         _ => &[Mode::Single],
     }
 }

@@ -19,7 +19,7 @@ const BLOCK_COST: f32 = 1.2;
 pub(super) const BLOCK: usize = 4;
 
 /// The most items in a leaf.
-pub(in crate::accel) const MAX_LEAF: usize = 8;
+pub(in crate::accel) const MAX_LEAF: usize = 4;
 
 /// An item to be sorted into the hierarchy.
 #[derive(Clone, Copy, Debug)]

@@ -1,13 +1,14 @@
 //! Eight boxes and four triangles at once: with AVX2 where available, and in plain Rust with the same results.
 
-use std::arch::x86_64::{__m256d, _CMP_GT_OQ, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NEQ_UQ};
+use std::arch::x86_64::{__m256d, __m256i, _CMP_GT_OQ, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NEQ_UQ, _CMP_NLE_UQ};
 
 use pulp::x86::V3;
 
 use super::build::BLOCK;
-use super::wide::{Block, WIDTH, WideNode};
+use super::wide::{Block, Child, Entry, WIDTH, WideNode};
 use crate::accel::tree::SlabRay;
-use crate::geometry::TriangleRay;
+use crate::geometry::{Shear, TriangleHit, TriangleRay};
+use crate::math::compact::ORDER_OF_8;
 
 /// A [`SlabRay`] with the rows of a node that it meets first and last.
 #[derive(Clone, Copy)]
@@ -19,7 +20,7 @@ pub(super) struct WideRay {
 impl WideRay {
     #[inline(always)]
     pub fn new(slab: SlabRay) -> Self {
-        let near = [0, 1, 2].map(|axis| 2 * axis + usize::from(slab.negative[axis]));
+        let near = [0, 1, 2].map(|axis| 2 * axis + usize::from(slab.is_negative(axis)));
         Self { slab, near }
     }
 }
@@ -27,15 +28,28 @@ impl WideRay {
 /// Which triangles of a block are hit, where.
 pub(super) struct BlockHits {
     pub mask: u32,
-    pub t: [f64; BLOCK],
-    pub u: [f64; BLOCK],
-    pub v: [f64; BLOCK],
+    t: [f64; BLOCK],
+    /// The edge functions of the second and third corner, and the sum of all three.
+    edges: [[f64; BLOCK]; 3],
+}
+
+impl BlockHits {
+    /// The hit on the triangle in a lane.
+    #[inline(always)]
+    pub fn get(&self, lane: usize) -> TriangleHit {
+        let [v, w, determinant] = [0, 1, 2].map(|i| self.edges[i][lane]);
+        TriangleHit { t: self.t[lane] as f32, u: (v / determinant) as f32, v: (w / determinant) as f32 }
+    }
 }
 
 /// One instruction set.
 pub(super) trait SimdIsa: Copy {
-    /// The children that the ray may meet within `[t_min, t_max]` as bits, and where it enters each.
+    /// The children that the ray may meet within `[t_min, t_max]` as bits, and where it enters each: of others, the NaN
+    /// whose bits are all set.
     fn enter(self, node: &WideNode, ray: &WideRay, t_min: f32, t_max: f32) -> (u32, [f32; WIDTH]);
+
+    /// The children that are entered, in an order as [`WideNode::orders`] has them, then others; and how many are.
+    fn ordered(self, enter: [f32; WIDTH], order: u32, children: &[Child; WIDTH]) -> ([Entry; WIDTH], u32);
 
     /// [`TriangleRay::intersect`] for each triangle, with the very same operations; `None` if no lane passes the edge
     /// tests.
@@ -60,18 +74,38 @@ impl SimdIsa for Portable {
                 leave[i] = if far < leave[i] { far } else { leave[i] };
             }
         }
-        let mask = (0..WIDTH).fold(0, |mask, i| mask | u32::from(enter[i] <= leave[i]) << i);
+        let mut mask = 0;
+        for i in 0..WIDTH {
+            if enter[i] <= leave[i] {
+                mask |= 1 << i;
+            } else {
+                enter[i] = f32::from_bits(u32::MAX);
+            }
+        }
         (mask, enter)
     }
 
     #[inline(always)]
+    fn ordered(self, enter: [f32; WIDTH], order: u32, children: &[Child; WIDTH]) -> ([Entry; WIDTH], u32) {
+        let (mut entries, mut count) = ([Entry::NONE; WIDTH], 0);
+        for slot in (0..WIDTH).map(|i| order as usize >> (3 * i) & 7) {
+            if enter[slot].is_sign_positive() {
+                entries[count] = Entry::new(enter[slot], children[slot]);
+                count += 1;
+            }
+        }
+        (entries, count as u32)
+    }
+
+    #[inline(always)]
     fn intersect(self, block: &Block, ray: &TriangleRay) -> Option<BlockHits> {
-        let mut hits = BlockHits { mask: 0, t: [0.0; BLOCK], u: [0.0; BLOCK], v: [0.0; BLOCK] };
+        let mut hits = BlockHits { mask: 0, t: [0.0; BLOCK], edges: [[0.0; BLOCK]; 3] };
+        let (axes, shear) = (ray.axes(), &ray.shear);
         for lane in 0..BLOCK {
             let corner = |c: usize| {
-                let at = |axis: usize| f64::from(block.corners[c][axis][lane]) - ray.origin[axis];
-                let z = at(ray.kz);
-                (at(ray.kx) - ray.sx * z, at(ray.ky) - ray.sy * z, z)
+                let at = |i: usize| f64::from(block.corners[c][axes[i]][lane]) - shear.origin[i];
+                let z = at(2);
+                (at(0) - shear.sx * z, at(1) - shear.sy * z, z)
             };
             let ((ax, ay, az), (bx, by, bz), (cx, cy, cz)) = (corner(0), corner(1), corner(2));
             let (u, v, w) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
@@ -79,10 +113,13 @@ impl SimdIsa for Portable {
                 continue;
             }
             let determinant = u + v + w;
-            let t = (u * az + v * bz + w * cz) / (determinant * ray.dz);
+            let t = (u * az + v * bz + w * cz) / (determinant * shear.dz);
             let inside = determinant != 0.0 && ray.t_min <= t && t <= ray.t_max;
             hits.mask |= u32::from(inside) << lane;
-            (hits.t[lane], hits.u[lane], hits.v[lane]) = (t, v / determinant, w / determinant);
+            hits.t[lane] = t;
+            for (row, value) in hits.edges.iter_mut().zip([v, w, determinant]) {
+                row[lane] = value;
+            }
         }
         (hits.mask != 0).then_some(hits)
     }
@@ -111,17 +148,37 @@ impl SimdIsa for V3 {
             enter = x._mm256_max_ps(near, enter);
             leave = x._mm256_min_ps(far, leave);
         }
-        let mask = x._mm256_movemask_ps(x._mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave));
-        (mask as u32, pulp::cast(enter))
+        let missed = x._mm256_cmp_ps::<_CMP_NLE_UQ>(enter, leave);
+        (!x._mm256_movemask_ps(missed) as u32 & 255, pulp::cast(x._mm256_or_ps(enter, missed)))
+    }
+
+    #[inline(always)]
+    fn ordered(self, enter: [f32; WIDTH], order: u32, children: &[Child; WIDTH]) -> ([Entry; WIDTH], u32) {
+        let x = self.avx2;
+        // A permutation looks at the lowest three bits.
+        let shifts = pulp::cast([0, 3, 6, 9, 12, 15, 18, 21]);
+        let order = x._mm256_srlv_epi32(self.avx._mm256_set1_epi32(order as i32), shifts);
+        let in_order = x._mm256_permutevar8x32_ps(pulp::cast(enter), order);
+        let mask = !self.avx._mm256_movemask_ps(in_order) as usize % 256;
+        let chosen = x._mm256_cvtepu8_epi32(pulp::cast([ORDER_OF_8[mask], 0]));
+        let distances: __m256i = pulp::cast(x._mm256_permutevar8x32_ps(in_order, chosen));
+        let slots = x._mm256_permutevar8x32_epi32(order, chosen);
+        let children = [0, 1, 2, 3, 4, 5, 6, 7].map(|i| children[i].bits());
+        let children = x._mm256_permutevar8x32_epi32(pulp::cast(children), slots);
+        let low = x._mm256_unpacklo_epi32(distances, children);
+        let high = x._mm256_unpackhi_epi32(distances, children);
+        let halves: [u64; WIDTH] =
+            pulp::cast([x._mm256_permute2x128_si256::<0x20>(low, high), x._mm256_permute2x128_si256::<0x31>(low, high)]);
+        ([0, 1, 2, 3, 4, 5, 6, 7].map(|i| Entry(halves[i])), mask.count_ones())
     }
 
     #[inline(always)]
     fn intersect(self, block: &Block, ray: &TriangleRay) -> Option<BlockHits> {
         let x = self.avx;
-        let origin = [ray.kx, ray.ky, ray.kz].map(|axis| ray.origin[axis]);
-        let a = Corner::new(self, &block.corners[0], ray, origin);
-        let b = Corner::new(self, &block.corners[1], ray, origin);
-        let c = Corner::new(self, &block.corners[2], ray, origin);
+        let (axes, shear) = (ray.axes(), &ray.shear);
+        let a = Corner::new(self, &block.corners[0], axes, shear);
+        let b = Corner::new(self, &block.corners[1], axes, shear);
+        let c = Corner::new(self, &block.corners[2], axes, shear);
         let (u, v, w) = (c.cross(self, &b), a.cross(self, &c), b.cross(self, &a));
         let zero = x._mm256_setzero_pd();
         // Lanes with a NaN pass or not; they fail the test of the interval.
@@ -136,7 +193,7 @@ impl SimdIsa for V3 {
         let determinant = x._mm256_add_pd(x._mm256_add_pd(u, v), w);
         let sum =
             x._mm256_add_pd(x._mm256_add_pd(x._mm256_mul_pd(u, a.z), x._mm256_mul_pd(v, b.z)), x._mm256_mul_pd(w, c.z));
-        let t = x._mm256_div_pd(sum, x._mm256_mul_pd(determinant, x._mm256_set1_pd(ray.dz)));
+        let t = x._mm256_div_pd(sum, x._mm256_mul_pd(determinant, x._mm256_set1_pd(shear.dz)));
         let inside = x._mm256_and_pd(
             x._mm256_cmp_pd::<_CMP_LE_OQ>(x._mm256_set1_pd(ray.t_min), t),
             x._mm256_cmp_pd::<_CMP_LE_OQ>(t, x._mm256_set1_pd(ray.t_max)),
@@ -146,12 +203,7 @@ impl SimdIsa for V3 {
         if mask == 0 {
             return None;
         }
-        Some(BlockHits {
-            mask,
-            t: pulp::cast(t),
-            u: pulp::cast(x._mm256_div_pd(v, determinant)),
-            v: pulp::cast(x._mm256_div_pd(w, determinant)),
-        })
+        Some(BlockHits { mask, t: pulp::cast(t), edges: pulp::cast([v, w, determinant]) })
     }
 }
 
@@ -165,14 +217,15 @@ struct Corner {
 
 impl Corner {
     #[inline(always)]
-    fn new(simd: V3, corner: &[[f32; BLOCK]; 3], ray: &TriangleRay, origin: [f64; 3]) -> Self {
+    fn new(simd: V3, corner: &[[f32; BLOCK]; 3], axes: [usize; 3], shear: &Shear) -> Self {
         let s = simd.avx;
-        let x = s._mm256_sub_pd(s._mm256_cvtps_pd(pulp::cast(corner[ray.kx])), s._mm256_set1_pd(origin[0]));
-        let y = s._mm256_sub_pd(s._mm256_cvtps_pd(pulp::cast(corner[ray.ky])), s._mm256_set1_pd(origin[1]));
-        let z = s._mm256_sub_pd(s._mm256_cvtps_pd(pulp::cast(corner[ray.kz])), s._mm256_set1_pd(origin[2]));
+        let [x, y, z] = [0, 1, 2].map(|i| s._mm256_cvtps_pd(pulp::cast(corner[axes[i]])));
+        let x = s._mm256_sub_pd(x, s._mm256_set1_pd(shear.origin.x));
+        let y = s._mm256_sub_pd(y, s._mm256_set1_pd(shear.origin.y));
+        let z = s._mm256_sub_pd(z, s._mm256_set1_pd(shear.origin.z));
         Self {
-            x: s._mm256_sub_pd(x, s._mm256_mul_pd(s._mm256_set1_pd(ray.sx), z)),
-            y: s._mm256_sub_pd(y, s._mm256_mul_pd(s._mm256_set1_pd(ray.sy), z)),
+            x: s._mm256_sub_pd(x, s._mm256_mul_pd(s._mm256_set1_pd(shear.sx), z)),
+            y: s._mm256_sub_pd(y, s._mm256_mul_pd(s._mm256_set1_pd(shear.sy), z)),
             z,
         }
     }

@@ -1,5 +1,6 @@
 //! A bounding volume hierarchy: built by the surface area heuristic, traced eight boxes and four triangles at a time.
 
+mod batch;
 mod binary;
 mod build;
 mod lanes;
@@ -11,8 +12,9 @@ mod wide;
 use pulp::x86::V3;
 
 use super::inspect::NodeInfo;
-use super::tree::{Counter, Items, Query, Tree};
-use crate::math::Aabb;
+use super::tree::{Answers, Counter, Items, Query, Tree, TwoLevel};
+use crate::math::{Aabb, RayRows};
+use batch::{Batch, Scratch};
 use binary::BinaryTree;
 pub(super) use build::{Binary, MAX_LEAF, Reference};
 use lanes::Portable;
@@ -49,7 +51,29 @@ impl<C: Counter, const ANY: bool> pulp::NullaryFnOnce for Run<'_, '_, C, ANY> {
     }
 }
 
+struct BatchRun<'r, 'a, A, const ANY: bool> {
+    simd: V3,
+    wide: &'r Wide,
+    batch: Batch<'r, 'a>,
+    scratch: &'r mut Scratch,
+    answers: &'r mut A,
+}
+
+impl<A: Answers, const ANY: bool> pulp::NullaryFnOnce for BatchRun<'_, '_, A, ANY> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        batch::trace::<_, ANY>(self.simd, self.wide, &self.batch, self.scratch, self.answers);
+    }
+}
+
 impl Bvh {
+    /// Whether the machine has the instructions that batches of rays are traced with.
+    pub fn is_vectorized() -> bool {
+        V3::try_new().is_some()
+    }
+
     /// The wide form over at least one item, traced with or without SIMD.
     fn wide(items: &Items<'_>, simd: Option<V3>) -> Self {
         let mut tree = Wide::new(&binary(items), items);
@@ -96,6 +120,21 @@ impl Tree for Bvh {
             Layout::Wide(wide, Some(simd)) => simd.vectorize(Run { simd: *simd, wide, query }),
             Layout::Wide(wide, None) => traverse::traverse(Portable, wide, query),
         }
+    }
+
+    fn trace_rows<const ANY: bool>(
+        accel: &TwoLevel<'_, Self>,
+        rays: &RayRows,
+        count: usize,
+        answers: &mut impl Answers,
+    ) {
+        let Layout::Wide(wide, Some(simd)) = &accel.world().0 else {
+            return accel.trace_one_by_one::<ANY>(rays, count, answers);
+        };
+        batch::with_scratch(|scratch| {
+            let batch = Batch { accel, rays, count };
+            simd.vectorize(BatchRun::<_, ANY> { simd: *simd, wide, batch, scratch, answers });
+        });
     }
 
     fn bounds(&self) -> Aabb {

@@ -1,14 +1,17 @@
 use super::build::{BLOCK, MAX_LEAF};
 use super::lanes::{Portable, SimdIsa, WideRay};
-use super::wide::{Block, Wide, WideNode};
+use super::wide::{Block, Entry, Wide, WideNode};
 use super::*;
-use crate::accel::Accelerator;
+use crate::accel::{Accelerator, Coherence, HitRows};
 use crate::accel::inspect::{Inspect, Item, StructureStats};
 use crate::accel::tree::testing::Sequence;
 use crate::accel::tree::{SlabRay, TwoLevel};
-use crate::geometry::{Geometry, Hit, Mesh, Shape, TrianglePoints, TriangleRay};
+use crate::geometry::{
+    Analytic, Geometry, Hit, Mesh, Shape, Sphere, TransformedShape, TriangleHit, TrianglePoints, TriangleRay,
+};
 use crate::id::{PrimId, ShapeId};
-use crate::math::{Ray, Vec3};
+use crate::math::rows::BATCH;
+use crate::math::{Ray, Transform, Vec3};
 
 /// Fewer where an interpreter looks for undefined behaviour.
 fn many(n: usize) -> usize {
@@ -80,8 +83,9 @@ fn assert_same_triangle_hits(lanes: impl SimdIsa) {
         let found = lanes.intersect(&block, &ray);
         for (lane, expected) in expected.iter().enumerate() {
             let found = found.as_ref().filter(|hits| hits.mask >> lane & 1 == 1);
-            let found = found.map(|h| [h.t[lane], h.u[lane], h.v[lane]].map(|x| (x as f32).to_bits()));
-            assert_eq!(found, expected.map(|h| [h.t, h.u, h.v].map(f32::to_bits)), "{ray:?} {:?}", triangles[lane]);
+            let bits = |h: TriangleHit| [h.t, h.u, h.v].map(f32::to_bits);
+            let found = found.map(|hits| bits(hits.get(lane)));
+            assert_eq!(found, expected.map(bits), "{ray:?} {:?}", triangles[lane]);
         }
         hits += expected.iter().flatten().count();
     }
@@ -129,6 +133,78 @@ fn assert_same_boxes(lanes: impl SimdIsa) {
         let (portable_mask, portable_enter) = Portable.enter(&node, &wide_ray, ray.t_min, ray.t_max);
         assert_eq!((mask, enter.map(f32::to_bits)), (portable_mask, portable_enter.map(f32::to_bits)));
     }
+}
+
+#[test]
+#[cfg_attr(any(miri, not(avx2)), ignore = "needs AVX2")]
+fn children_are_in_the_order_of_their_octant() {
+    let mut random = Sequence(12);
+    let simd = V3::try_new().unwrap();
+    for _ in 0..many(20_000) {
+        let mut node = WideNode::EMPTY;
+        for slot in 0..random.below(WIDTH + 1) {
+            let (a, b) = (corner(&mut random), corner(&mut random));
+            node.set(slot, &Aabb { min: a.min(b), max: a.max(b) }, wide::Child::blocks(slot, 1));
+        }
+        node.set_orders();
+        let ray = ray(&mut random);
+        if !ray.is_valid() {
+            continue;
+        }
+        let slab = SlabRay::new(&ray, &Aabb { min: -Vec3::ONE, max: Vec3::ONE }, 0.0);
+        let (mask, enter) = Portable.enter(&node, &WideRay::new(slab), ray.t_min, ray.t_max);
+        for order in node.orders.into_iter().chain([WideNode::BY_SLOT]) {
+            let expected: Vec<_> = (0..WIDTH)
+                .map(|i| order as usize >> (3 * i) & 7)
+                .filter(|slot| mask >> slot & 1 == 1)
+                .map(|slot| Entry::new(enter[slot], node.children[slot]))
+                .collect();
+            for (entries, count) in
+                [Portable.ordered(enter, order, &node.children), simd.ordered(enter, order, &node.children)]
+            {
+                assert_eq!(entries[..count as usize], expected);
+            }
+        }
+        // Far to near, along the diagonal of the octant.
+        let center = |slot: usize| node.get(slot).map(|(bounds, _)| bounds.min + bounds.max);
+        for (octant, order) in node.orders.into_iter().enumerate() {
+            let sign = |axis: usize| if octant >> axis & 1 != 0 { -1.0 } else { 1.0 };
+            let centers = (0..WIDTH).filter_map(|i| center(order as usize >> (3 * i) & 7));
+            let distances: Vec<f32> = centers.map(|c| (0..3).map(|axis| sign(axis) * c[axis]).sum()).collect();
+            assert!(distances.is_sorted_by(|a, b| a >= b), "{distances:?}");
+        }
+    }
+}
+
+#[test]
+#[cfg_attr(any(miri, not(avx2)), ignore = "needs AVX2")]
+fn rays_in_rows_have_the_answers_of_single_rays() {
+    let mut random = Sequence(13);
+    let mut geometry = soup(&mut random, 3_000);
+    // Others than triangles at rest have leaves of their own.
+    let sphere = Analytic::Sphere(Sphere::new(0.3, -0.3, 0.3, std::f64::consts::TAU).unwrap());
+    geometry.world.push(ShapeId(1));
+    geometry.shapes.push(Shape::Analytic(TransformedShape::new(sphere, Transform::IDENTITY)));
+    let accel = TwoLevel::<Bvh>::new(&geometry, &BvhOptions::default(), 1);
+    let mut rays: Vec<_> = (0..20_000).map(|_| ray(&mut random)).collect();
+    for i in (0..rays.len()).step_by(7) {
+        rays[i].t_max = random.next();
+    }
+    let mut hits = 0;
+    // Every length of a batch.
+    for count in (0..=BATCH).chain(std::iter::repeat_n(BATCH, 100)) {
+        let rays: Vec<_> = rays.iter().copied().skip(random.below(rays.len() - BATCH)).take(count).collect();
+        let rows = RayRows::of(&rays);
+        let (mut found, mut occluded) = (HitRows::default(), [true; BATCH]);
+        accel.intersect_rows(&rows, count, &mut found, Coherence::Incoherent);
+        accel.occluded_rows(&rows, count, &mut occluded, Coherence::Coherent);
+        for (lane, ray) in rays.iter().enumerate() {
+            let hit = accel.intersect(ray);
+            assert_eq!((found.get(lane), occluded[lane]), (hit, hit.is_some()), "{ray:?}");
+            hits += usize::from(hit.is_some());
+        }
+    }
+    assert!(hits > 2_000, "{hits}");
 }
 
 fn mesh(triangles: &[[Vec3; 3]]) -> Geometry {

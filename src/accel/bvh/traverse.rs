@@ -7,7 +7,7 @@ use super::lanes::{SimdIsa, WideRay};
 use super::wide::{Block, Child, ChildKind, STACK, Wide};
 use crate::accel::inspect::ItemKind;
 use crate::accel::tree::{Counter, Query, SlabRay};
-use crate::geometry::Hit;
+use crate::geometry::{Hit, TriangleHit};
 
 type Entry = (f32, Child);
 
@@ -74,7 +74,13 @@ fn leaf<L: SimdIsa, C: Counter, const ANY: bool>(
 ) -> bool {
     match child.kind() {
         ChildKind::Blocks { first, count } => {
-            wide.blocks[first as usize..(first + count) as usize].iter().any(|block| test_block(lanes, block, query))
+            // A loop: closures are inlined, and so vector code, only while they have one caller.
+            for block in &wide.blocks[first as usize..(first + count) as usize] {
+                if test_block(lanes, block, query) {
+                    return true;
+                }
+            }
+            false
         }
         ChildKind::Items { first, count } => {
             wide.items[first as usize..(first + count) as usize].iter().any(|&item| query.test(item))
@@ -96,7 +102,7 @@ fn test_block<L: SimdIsa, C: Counter, const ANY: bool>(
         let lane = mask.trailing_zeros() as usize;
         mask &= mask - 1;
         let ItemKind::Prim(shape, prim) = block.items[lane].kind() else { continue };
-        let (t, u, v) = (hits.t[lane] as f32, hits.u[lane] as f32, hits.v[lane] as f32);
+        let TriangleHit { t, u, v } = hits.get(lane);
         if query.offer(Hit { t, u, v, shape, prim, instance: query.instance() }) {
             return true;
         }

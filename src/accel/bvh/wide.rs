@@ -26,11 +26,19 @@ pub(super) enum ChildKind {
 impl Child {
     const INDEX_BITS: u32 = 27;
     const MAX_COUNT: u32 = 7;
+    /// The first node.
+    pub const ROOT: Self = Self(0);
     /// Behind an empty box, never opened.
     pub const NONE: Self = Self(u32::MAX);
 
     fn node(index: usize) -> Self {
         Self(index as u32)
+    }
+
+    /// A run of triangle blocks.
+    #[cfg(test)]
+    pub fn blocks(first: usize, count: usize) -> Self {
+        Self::run(1, first, count)
     }
 
     fn run(tag: u32, first: usize, count: usize) -> Self {
@@ -39,8 +47,25 @@ impl Child {
     }
 
     #[inline(always)]
+    pub fn bits(self) -> u32 {
+        self.0
+    }
+
+    #[inline(always)]
     pub fn is_node(self) -> bool {
         self.0 >> 30 == 0
+    }
+
+    /// The index of an inner node.
+    #[inline(always)]
+    pub fn node_index(self) -> usize {
+        self.0 as usize
+    }
+
+    /// The first of a run.
+    #[inline(always)]
+    pub fn first(self) -> usize {
+        (self.0 & ((1 << Self::INDEX_BITS) - 1)) as usize
     }
 
     #[inline(always)]
@@ -55,6 +80,30 @@ impl Child {
     }
 }
 
+/// A child, and where a ray enters its box: in the low half the bits of the distance, in the high half the child.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(transparent)]
+pub(super) struct Entry(pub u64);
+
+impl Entry {
+    pub const NONE: Self = Self::new(f32::INFINITY, Child::NONE);
+
+    #[inline(always)]
+    pub const fn new(near: f32, child: Child) -> Self {
+        Self(near.to_bits() as u64 | (child.0 as u64) << 32)
+    }
+
+    #[inline(always)]
+    pub fn near(self) -> f32 {
+        f32::from_bits(self.0 as u32)
+    }
+
+    #[inline(always)]
+    pub fn child(self) -> Child {
+        Child((self.0 >> 32) as u32)
+    }
+}
+
 /// Boxes of up to eight children. Unused ones are empty: no ray meets them.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
@@ -62,12 +111,17 @@ pub(super) struct WideNode {
     /// For each axis the smallest, then the largest coordinates: row `2 axis + side`.
     pub planes: [[f32; WIDTH]; 6],
     pub children: [Child; WIDTH],
+    /// Slots from far to near, three bits each, for rays of each octant: bit `axis` is set where they go down an axis.
+    pub orders: [u32; 8],
 }
 
 impl WideNode {
+    /// The order of the slots.
+    pub const BY_SLOT: u32 = 0o76_543_210;
+
     pub const EMPTY: Self = {
         let (low, high) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
-        Self { planes: [low, high, low, high, low, high], children: [Child::NONE; WIDTH] }
+        Self { planes: [low, high, low, high, low, high], children: [Child::NONE; WIDTH], orders: [Self::BY_SLOT; 8] }
     };
 
     pub fn set(&mut self, slot: usize, bounds: &Aabb, child: Child) {
@@ -76,6 +130,19 @@ impl WideNode {
             self.planes[2 * axis + 1][slot] = bounds.max[axis];
         }
         self.children[slot] = child;
+    }
+
+    /// Sets the orders once all children are known: by the centers of their boxes.
+    pub fn set_orders(&mut self) {
+        for octant in 0..8 {
+            let distance = |slot: &usize| -> f32 {
+                let sign = |axis: usize| if octant >> axis & 1 != 0 { -1.0 } else { 1.0 };
+                (0..3).map(|axis| sign(axis) * (self.planes[2 * axis][*slot] + self.planes[2 * axis + 1][*slot])).sum()
+            };
+            let mut slots = [0, 1, 2, 3, 4, 5, 6, 7];
+            slots.sort_by(|a, b| distance(b).total_cmp(&distance(a)));
+            self.orders[octant] = slots.iter().rev().fold(0, |order, slot| order << 3 | *slot as u32);
+        }
     }
 
     /// The box and the child in a slot in use.
@@ -87,7 +154,7 @@ impl WideNode {
 
 /// Up to four triangles in lanes. Unused lanes repeat the first triangle under its own ids, which changes no result.
 #[derive(Clone, Copy, Debug)]
-#[repr(C, align(16))]
+#[repr(C, align(64))]
 pub(super) struct Block {
     /// Coordinates by corner, then axis.
     pub corners: [[[f32; BLOCK]; 3]; 3],
@@ -129,6 +196,7 @@ impl Wide {
                 };
                 wide.nodes[target].set(slot, &node.bounds, child);
             }
+            wide.nodes[target].set_orders();
         }
         wide.nodes.shrink_to_fit();
         wide.blocks.shrink_to_fit();

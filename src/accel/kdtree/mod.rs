@@ -89,7 +89,7 @@ impl Tree for KdTree {
                 let begin = (node.split - slab.near_origin[axis]) * slab.near_reciprocal[axis];
                 let end = (node.split - slab.far_origin[axis]) * slab.far_reciprocal[axis];
                 let (lower, upper) = (index + 1, node.index());
-                let (first, second) = if slab.negative[axis] { (upper, lower) } else { (lower, upper) };
+                let (first, second) = if slab.is_negative(axis) { (upper, lower) } else { (lower, upper) };
                 if begin > leave {
                     index = first;
                 } else if end < enter {

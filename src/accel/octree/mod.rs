@@ -82,7 +82,7 @@ impl Tree for Octree {
         let slab = SlabRay::new(&query.ray, &self.nodes[0].bounds, query.slack());
         let t_min = query.ray.t_min;
         // The octant that a ray meets first has its bit set on the axes along which the ray runs down.
-        let first_octant = (0..3).fold(0, |bits, axis| bits | u32::from(slab.negative[axis]) << axis);
+        let first_octant = slab.negative;
         let mut stack = ArrayVec::<(f32, u32), STACK>::new();
         if slab.interval(&self.nodes[0].bounds, t_min, query.t_max()).is_some() {
             stack.push((t_min, 0));

@@ -29,10 +29,10 @@ impl<'g> Items<'g> {
         Self { geometry, list, bounds }
     }
 
-    /// Everything in the world: primitives, and instances of objects whose bounds are given. Instances of empty objects
-    /// are left out.
-    pub fn of_world(geometry: &'g Geometry, objects: &[Aabb]) -> Self {
-        let mut items = Self::of_shapes(geometry, &geometry.world);
+    /// These shapes of the world, and instances of objects whose bounds are given. Instances of empty objects are left
+    /// out.
+    pub fn of_world(geometry: &'g Geometry, shapes: &[ShapeId], objects: &[Aabb]) -> Self {
+        let mut items = Self::of_shapes(geometry, shapes);
         for (i, instance) in geometry.instances.iter().enumerate() {
             let bounds = instance.bounds(&objects[instance.object.index()]);
             if !bounds.is_empty() {

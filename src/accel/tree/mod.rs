@@ -10,12 +10,49 @@ pub(super) mod testing;
 mod two_level;
 
 pub(super) use items::Items;
-pub(super) use query::{Counter, NotCounted, Query};
-pub(super) use slab::SlabRay;
+pub(super) use query::{Counter, NotCounted, Query, t_max_after};
+pub(super) use slab::{SlabRay, SlabRows};
 pub(super) use two_level::TwoLevel;
 
 use super::inspect::NodeInfo;
-use crate::math::Aabb;
+use super::HitRows;
+use crate::geometry::Hit;
+use crate::math::rows::BATCH;
+use crate::math::{Aabb, RayRows};
+
+/// Where the answers to the rays of a batch go.
+pub(super) trait Answers {
+    /// The closest hit of a lane so far.
+    fn get(&self, lane: usize) -> Option<Hit>;
+
+    /// Sets the hit of a lane.
+    fn set(&mut self, lane: usize, hit: Option<Hit>);
+}
+
+impl Answers for HitRows {
+    #[inline(always)]
+    fn get(&self, lane: usize) -> Option<Hit> {
+        Self::get(self, lane)
+    }
+
+    #[inline(always)]
+    fn set(&mut self, lane: usize, hit: Option<Hit>) {
+        Self::set(self, lane, hit);
+    }
+}
+
+/// Whether there are hits.
+impl Answers for [bool; BATCH] {
+    #[inline(always)]
+    fn get(&self, _: usize) -> Option<Hit> {
+        None
+    }
+
+    #[inline(always)]
+    fn set(&mut self, lane: usize, hit: Option<Hit>) {
+        self[lane] = hit.is_some();
+    }
+}
 
 /// A tree over items.
 pub(super) trait Tree: Send + Sync + Sized {
@@ -29,6 +66,16 @@ pub(super) trait Tree: Send + Sync + Sized {
     /// Visits every item that the query's ray may hit within its interval, nearer ones first as far as the bounds show,
     /// until a visit returns true. An item may be visited twice.
     fn traverse<C: Counter, const ANY: bool>(&self, query: &mut Query<'_, Self, C, ANY>);
+
+    /// Answers the first `count` rays, or whether there are `ANY` hits.
+    fn trace_rows<const ANY: bool>(
+        accel: &TwoLevel<'_, Self>,
+        rays: &RayRows,
+        count: usize,
+        answers: &mut impl Answers,
+    ) {
+        accel.trace_one_by_one::<ANY>(rays, count, answers);
+    }
 
     /// Bounds of all items; empty if there is none.
     fn bounds(&self) -> Aabb;

@@ -50,6 +50,13 @@ pub(in crate::accel) struct Query<'a, T, C, const ANY: bool> {
     accel: &'a TwoLevel<'a, T>,
 }
 
+/// What `t_max` becomes with a hit: one float beyond it, so that a hit which rounds to the same distance is compared as
+/// a tie.
+#[inline(always)]
+pub(in crate::accel) fn t_max_after(hit: &Hit, t_max: f32) -> f32 {
+    hit.t.next_up().min(t_max)
+}
+
 impl<'a, T: Tree, C: Counter, const ANY: bool> Query<'a, T, C, ANY> {
     /// A query of the world; the ray must be valid.
     #[inline(always)]
@@ -122,7 +129,7 @@ impl<'a, T: Tree, C: Counter, const ANY: bool> Query<'a, T, C, ANY> {
     fn take(&mut self, hit: Hit) -> bool {
         if self.best.is_none_or(|best| hit.is_before(&best)) {
             self.best = Some(hit);
-            self.set_t_max(hit.t.next_up().min(self.ray.t_max));
+            self.set_t_max(t_max_after(&hit, self.ray.t_max));
         }
         ANY
     }

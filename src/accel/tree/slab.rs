@@ -1,6 +1,7 @@
 //! A ray prepared for boxes, so that no box is missed that the exact ray meets.
 
-use crate::math::{Aabb, Ray, Vec3};
+use crate::math::rows::soa;
+use crate::math::{Aabb, Ray, Vec3, vec3};
 
 /// Relative slack of a distance to a plane: three roundings on each side and the scaling itself, twice over (Ize,
 /// "Robust BVH Ray Traversal").
@@ -13,24 +14,25 @@ const TRACE: f32 = 1e-12;
 /// Largest reciprocal of a direction's component on the near side; smaller ones only open more boxes.
 const LARGEST_RECIPROCAL: f32 = 1e30;
 
-/// A ray prepared for conservative slab tests.
-///
-/// A box is entered at `max((near plane - near_origin) * near_reciprocal)` and left at
-/// `min((far plane - far_origin) * far_reciprocal)` over the axes. Origins stand one float (or the given slack)
-/// outside, reciprocals are scaled by a few roundings, so entries are never late and exits never early. A far product
-/// is NaN where a plane holds the origin and the direction has no component; it then does not count.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::accel) struct SlabRay {
-    /// Origin to subtract from near planes.
-    pub near_origin: Vec3,
-    /// Origin to subtract from far planes.
-    pub far_origin: Vec3,
-    /// Finite.
-    pub near_reciprocal: Vec3,
-    /// May be infinite.
-    pub far_reciprocal: Vec3,
-    /// Axes along which the maximum is the near plane.
-    pub negative: [bool; 3],
+soa! {
+    /// A ray prepared for conservative slab tests.
+    ///
+    /// A box is entered at `max((near plane - near_origin) * near_reciprocal)` and left at
+    /// `min((far plane - far_origin) * far_reciprocal)` over the axes. Origins stand one float (or the given slack)
+    /// outside, reciprocals are scaled by a few roundings, so entries are never late and exits never early. A far
+    /// product is NaN where a plane holds the origin and the direction has no component; it then does not count.
+    pub(in crate::accel) struct SlabRows of SlabRay {
+        /// Origin to subtract from near planes.
+        near_origin: Vec3,
+        /// Origin to subtract from far planes.
+        far_origin: Vec3,
+        /// Finite.
+        near_reciprocal: Vec3,
+        /// May be infinite.
+        far_reciprocal: Vec3,
+        /// A bit for each axis along which the maximum is the near plane.
+        negative: u32,
+    }
 }
 
 impl SlabRay {
@@ -42,16 +44,26 @@ impl SlabRay {
         // A float of the origin, and for f64 tests of primitives a trace of the whole size.
         let shift = ray.origin.abs() * f32::EPSILON + Vec3::splat(size * TRACE + slack);
         let reciprocal = ray.direction.recip();
-        let negative = [0, 1, 2].map(|axis| ray.direction[axis].is_sign_negative());
-        let outward = Vec3::select(glam::BVec3::from_array(negative), -shift, shift);
+        let outward = vec3(
+            shift.x.copysign(ray.direction.x),
+            shift.y.copysign(ray.direction.y),
+            shift.z.copysign(ray.direction.z),
+        );
+        let sign = |component: f32| component.to_bits() >> 31;
         Self {
             near_origin: ray.origin + outward,
             far_origin: ray.origin - outward,
             near_reciprocal: reciprocal.clamp(Vec3::splat(-LARGEST_RECIPROCAL), Vec3::splat(LARGEST_RECIPROCAL))
                 * (1.0 - RELATIVE),
             far_reciprocal: reciprocal * (1.0 + RELATIVE),
-            negative,
+            negative: sign(ray.direction.x) | sign(ray.direction.y) << 1 | sign(ray.direction.z) << 2,
         }
+    }
+
+    /// Whether the maximum is the near plane along an axis.
+    #[inline(always)]
+    pub fn is_negative(&self, axis: usize) -> bool {
+        self.negative >> axis & 1 != 0
     }
 
     /// Where the ray may be inside the box within `[t_min, t_max]`.
@@ -59,7 +71,7 @@ impl SlabRay {
     pub fn interval(&self, bounds: &Aabb, t_min: f32, t_max: f32) -> Option<(f32, f32)> {
         let (mut enter, mut leave) = (t_min, t_max);
         for axis in 0..3 {
-            let (near, far) = if self.negative[axis] {
+            let (near, far) = if self.is_negative(axis) {
                 (bounds.max[axis], bounds.min[axis])
             } else {
                 (bounds.min[axis], bounds.max[axis])

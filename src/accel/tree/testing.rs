@@ -34,5 +34,5 @@ pub fn mesh_geometry(triangles: &[TrianglePoints]) -> Geometry {
 
 /// What the world's tree is built over, if there are no instances.
 pub fn items_of(geometry: &Geometry) -> Items<'_> {
-    Items::of_world(geometry, &[])
+    Items::of_world(geometry, &geometry.world, &[])
 }

@@ -1,12 +1,13 @@
 //! A tree over the world, and one over each object that instances place.
 
-use super::{Counter, Items, NotCounted, Query, Tree};
-use crate::accel::Accelerator;
+use super::{Answers, Counter, Items, NotCounted, Query, Tree};
+use crate::accel::{Accelerator, Coherence, HitRows};
 use crate::accel::inspect::{Inspect, NodeInfo, TraversalCounts};
 use crate::geometry::{Geometry, Hit, Instance};
-use crate::id::ObjectId;
+use crate::id::{ObjectId, ShapeId};
 use crate::math::float::UNIT_ROUNDOFF;
-use crate::math::{Aabb, DAffine3, Motion, Ray, Transform};
+use crate::math::rows::BATCH;
+use crate::math::{Aabb, DAffine3, Motion, Ray, RayRows, Transform};
 
 /// Trees over borrowed geometry.
 pub(in crate::accel) struct TwoLevel<'g, T> {
@@ -20,6 +21,11 @@ pub(in crate::accel) struct TwoLevel<'g, T> {
 impl<'g, T: Tree> TwoLevel<'g, T> {
     /// Builds all trees with `threads` threads (0: all).
     pub fn new(geometry: &'g Geometry, options: &T::Options, threads: usize) -> Self {
+        Self::over(geometry, &geometry.world, options, threads)
+    }
+
+    /// Over some shapes of the world, and all instances.
+    pub fn over(geometry: &'g Geometry, shapes: &[ShapeId], options: &T::Options, threads: usize) -> Self {
         let build = || {
             let objects: Vec<T> = geometry
                 .objects
@@ -27,7 +33,7 @@ impl<'g, T: Tree> TwoLevel<'g, T> {
                 .map(|object| T::build(&Items::of_shapes(geometry, &object.shapes), options))
                 .collect();
             let bounds: Vec<Aabb> = objects.iter().map(T::bounds).collect();
-            (T::build(&Items::of_world(geometry, &bounds), options), objects)
+            (T::build(&Items::of_world(geometry, shapes, &bounds), options), objects)
         };
         // A pool that cannot be made is no reason to fail: the current one builds the same trees.
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
@@ -41,7 +47,7 @@ impl<'g, T: Tree> TwoLevel<'g, T> {
     /// A tree made by `build` over the world of a geometry without instances.
     #[cfg(test)]
     pub fn over_world(geometry: &'g Geometry, build: impl Fn(&Items<'_>) -> T) -> Self {
-        let world = build(&Items::of_world(geometry, &[]));
+        let world = build(&Items::of_world(geometry, &geometry.world, &[]));
         Self { geometry, world, objects: Vec::new(), bounds: geometry.bounds(), instances: None }
     }
 
@@ -61,6 +67,18 @@ impl<'g, T: Tree> TwoLevel<'g, T> {
     #[inline(always)]
     pub fn instance_slack(&self, ray: &Ray) -> f32 {
         self.instances.map_or(0.0, |rounding| rounding.slack(ray))
+    }
+
+    /// The tree over the world.
+    pub fn world(&self) -> &T {
+        &self.world
+    }
+
+    /// As [`Tree::trace_rows`], one ray after the other.
+    pub fn trace_one_by_one<const ANY: bool>(&self, rays: &RayRows, count: usize, answers: &mut impl Answers) {
+        for lane in 0..count {
+            answers.set(lane, self.query::<_, ANY>(&rays.get(lane), &mut NotCounted));
+        }
     }
 
     #[inline(always)]
@@ -121,6 +139,14 @@ impl<T: Tree> Accelerator for TwoLevel<'_, T> {
 
     fn occluded(&self, ray: &Ray) -> bool {
         self.query::<_, true>(ray, &mut NotCounted).is_some()
+    }
+
+    fn intersect_rows(&self, rays: &RayRows, count: usize, hits: &mut HitRows, _: Coherence) {
+        T::trace_rows::<false>(self, rays, count.min(BATCH), hits);
+    }
+
+    fn occluded_rows(&self, rays: &RayRows, count: usize, occluded: &mut [bool; BATCH], _: Coherence) {
+        T::trace_rows::<true>(self, rays, count.min(BATCH), occluded);
     }
 
     fn bounds(&self) -> Aabb {

@@ -86,7 +86,12 @@ pub fn packets(geometry: &Geometry) -> Box<dyn Accelerator + '_> {
 
 /// Embree with packets for analytic shapes, also for single rays.
 pub fn hybrid(geometry: &Geometry) -> Box<dyn Accelerator + '_> {
-    Box::new(BatchesOfOne(build(AccelKind::Hybrid, geometry)))
+    Box::new(BatchesOfOne(build(AccelKind::HYBRID, geometry)))
+}
+
+/// The BVH with packets for analytic shapes, floors and walls, also for single rays.
+pub fn hybrid_bvh(geometry: &Geometry) -> Box<dyn Accelerator + '_> {
+    Box::new(BatchesOfOne(build(AccelKind::HYBRID_BVH, geometry)))
 }
 
 /// What every entry point answers to these rays: single, in coherent batches and in incoherent ones.

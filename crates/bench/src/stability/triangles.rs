@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use super::geometry::{
     Rng, closest, cube, grid, instances, mesh, meshes, ray, ray_through, sphere_mesh, transform, triangle, world,
 };
+use super::scenes::hybrid_bvh;
 use super::{Effort, Faults, Outcome};
 use crate::accel::{self, AccelKind, Accelerator, LinearAccel};
 use crate::geometry::{Analytic, Geometry, Mesh, MeshStep, Quad, Shape, SurfaceInteraction, TransformedShape};
@@ -55,17 +56,18 @@ const FAR: DVec3 = DVec3::new(148_376.0, 1_234.0, -223_423.0);
 
 type Named<'g> = (&'static str, Box<dyn Accelerator + 'g>);
 
-/// Every accelerator but the hybrid one, whose triangles are Embree's; the linear one only for few triangles.
+/// Every accelerator but `hybrid`, whose triangles are Embree's, and `hybrid:bvh`; the linear one only for few triangles.
 fn accelerators(geometry: &Geometry) -> Vec<Named<'_>> {
     const FEW: usize = 5_000;
     let prims: usize = geometry.shapes.iter().map(Shape::prim_count).sum();
     let is_feasible = |kind: AccelKind| match kind {
-        AccelKind::Hybrid => false,
+        AccelKind::Hybrid(_) => false,
         AccelKind::Linear => prims <= FEW,
         _ => true,
     };
     let feasible = AccelKind::ALL.into_iter().filter(|(kind, _)| is_feasible(*kind));
-    feasible.map(|(kind, name)| (name, accel::build(kind, geometry, 1).expect("accelerators build"))).collect()
+    let all = feasible.map(|(kind, name)| (name, accel::build(kind, geometry, 1).expect("accelerators build")));
+    all.chain([("hybrid:bvh", hybrid_bvh(geometry))]).collect()
 }
 
 fn embree(geometry: &Geometry) -> Box<dyn Accelerator + '_> {

@@ -11,7 +11,7 @@ use moving::f8_motion_bounds;
 use visits::f9_visits;
 
 use super::geometry::{Rng, grid, ids, ray, world};
-use super::scenes::{all, at_times, build, hybrid, moving_scene, own, packets, path_rays, same, scenes, test_rays};
+use super::scenes::{all, at_times, build, hybrid, hybrid_bvh, moving_scene, own, packets, path_rays, same, scenes, test_rays};
 use super::{Effort, Faults, Outcome};
 use crate::accel::{AccelKind, Accelerator, Coherence, LinearAccel};
 use crate::geometry::{Geometry, Hit, Shape};
@@ -122,7 +122,7 @@ fn f1_closest_hits(effort: Effort) -> Outcome {
     let cases = cases(effort.pick(250, 10_000));
     let (mut rays, mut hits, mut poor) = (0, 0, 0);
     let mut counts: Vec<(&str, Faults)> = Vec::new();
-    let mut rounding: [Agreement; 3] = Default::default();
+    let mut rounding: [Agreement; 4] = Default::default();
     for Case { geometry, expected } in &cases {
         let found = expected.iter().filter(|(_, hit)| hit.is_some()).count();
         rays += expected.len();
@@ -135,7 +135,8 @@ fn f1_closest_hits(effort: Effort) -> Outcome {
                 None => counts.push((name, lost)),
             }
         }
-        let within_rounding = [build(AccelKind::EMBREE, geometry), packets(geometry), hybrid(geometry)];
+        let within_rounding =
+            [build(AccelKind::EMBREE, geometry), packets(geometry), hybrid(geometry), hybrid_bvh(geometry)];
         for (sum, accel) in rounding.iter_mut().zip(within_rounding) {
             let Agreement { flags, distances, ties } = Agreement::of(&*accel, geometry, expected);
             sum.flags += flags;
@@ -148,7 +149,7 @@ fn f1_closest_hits(effort: Effort) -> Outcome {
     let outcome = counts
         .into_iter()
         .fold(outcome, |outcome, (name, lost)| outcome.none(format!("answers of {name} that differ in a bit"), lost));
-    ["Embree", "packets", "hybrid"].iter().zip(rounding).fold(
+    ["Embree", "packets", "hybrid", "hybrid:bvh"].iter().zip(rounding).fold(
         outcome,
         |outcome, (name, Agreement { flags, distances, ties })| {
             outcome

@@ -1,0 +1,277 @@
+//! Many rays through the wide hierarchy in turn: while the memory that one of them needs is on its way, others advance.
+//!
+//! Rays are prepared in rows. Then up to [`SLOTS`] are on their way at once: a round opens a node for each ray that is
+//! at one, and tests a leaf for each ray that is at one, so that few branches depend on single rays; what a ray needs
+//! in the next round is prefetched. Answers are those of single rays, bit for bit.
+
+use std::cell::RefCell;
+use std::hint::select_unpredictable;
+
+use super::Bvh;
+use super::lanes::{SimdIsa, WideRay};
+use super::wide::{Block, Child, ChildKind, Entry, STACK, WIDTH, Wide, WideNode};
+use crate::accel::inspect::ItemKind;
+use crate::accel::tree::{Answers, NotCounted, Query, SlabRay, SlabRows, TwoLevel, t_max_after};
+use crate::geometry::{Hit, Shear, ShearRows, TriangleHit, TriangleRay, largest_axis};
+use crate::math::compact::set_bits;
+use crate::math::prefetch::{address, prefetch_lines};
+use crate::math::rows::{BATCH, Row, WIDTH as ROW_WIDTH, whole_vectors};
+use crate::math::{Ray, RayRows};
+
+/// Rays on their way at once: a bit each.
+const SLOTS: usize = 32;
+
+/// Lines of the caches that a node fills; a block fills one less.
+const PREFETCHED_LINES: usize = size_of::<WideNode>() / 64;
+
+/// Rays to be traced.
+pub(super) struct Batch<'r, 'a> {
+    pub accel: &'r TwoLevel<'a, Bvh>,
+    pub rays: &'r RayRows,
+    pub count: usize,
+}
+
+/// What one thread needs to trace batches.
+pub(super) struct Scratch {
+    slabs: SlabRows,
+    shears: ShearRows,
+    axes: Row<u32>,
+    t_max: Row,
+    is_valid: Row<u32>,
+    keys: Row<u32>,
+    /// The node or leaf that each ray visits next.
+    next: [Child; BATCH],
+    stacks: [Stack; SLOTS],
+}
+
+thread_local! {
+    static SCRATCH: RefCell<Box<Scratch>> = RefCell::default();
+}
+
+/// Calls `trace` with the memory of this thread.
+pub(super) fn with_scratch(trace: impl FnOnce(&mut Scratch)) {
+    SCRATCH.with_borrow_mut(|scratch| trace(scratch));
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        Self {
+            slabs: SlabRows::default(),
+            shears: ShearRows::default(),
+            axes: [0; BATCH],
+            t_max: [0.0; BATCH],
+            is_valid: [0; BATCH],
+            keys: [0; BATCH],
+            next: [Child::ROOT; BATCH],
+            stacks: [Stack { entries: [Entry::NONE; STACK + WIDTH], len: 0 }; SLOTS],
+        }
+    }
+}
+
+impl Scratch {
+    /// Prepares the rays of a batch.
+    #[inline(always)]
+    fn prepare(&mut self, wide: &Wide, batch: &Batch<'_, '_>) {
+        let rays = batch.rays;
+        let count = whole_vectors(batch.count);
+        for lane in 0..count {
+            let ray = rays.get(lane);
+            self.slabs.set(lane, &SlabRay::new(&ray, &wide.bounds, batch.accel.instance_slack(&ray)));
+        }
+        for lane in 0..count {
+            self.is_valid[lane] = rays.get(lane).is_valid().into();
+            self.axes[lane] = largest_axis(rays.direction.get(lane));
+        }
+        for lane in 0..count {
+            let (origin, direction) = (rays.origin.get(lane), rays.direction.get(lane));
+            self.shears.set(lane, &Shear::new(origin, direction, self.axes[lane]));
+        }
+        self.t_max = rays.t_max;
+        self.next = [Child::ROOT; BATCH];
+        let cutouts = &batch.accel.geometry().cutouts;
+        for (i, keys) in self.keys.chunks_mut(ROW_WIDTH).enumerate().take(count / ROW_WIDTH) {
+            cutouts.set_keys(rays, i * ROW_WIDTH, keys);
+        }
+    }
+}
+
+/// Children that wait. An odd number of cache lines, so that the tops of all stacks are not in the same few sets.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct Stack {
+    entries: [Entry; STACK + WIDTH],
+    len: usize,
+}
+
+impl Stack {
+    /// Adds the first `count` entries.
+    #[inline(always)]
+    fn push(&mut self, entries: [Entry; WIDTH], count: u32) {
+        if let Some(top) = self.entries.get_mut(self.len..).and_then(|free| free.first_chunk_mut()) {
+            *top = entries;
+            self.len += count as usize;
+        }
+    }
+
+    /// Takes entries from the top, up to one that is entered before `t_max`.
+    #[inline(always)]
+    fn pop(&mut self, t_max: f32) -> Option<Child> {
+        while self.len > 0 {
+            self.len -= 1;
+            let entry = self.entries[self.len];
+            if entry.near() <= t_max {
+                return Some(entry.child());
+            }
+        }
+        None
+    }
+}
+
+/// Which slots have a ray at a node, and which at a leaf.
+#[derive(Clone, Copy, Default)]
+struct Places {
+    nodes: u32,
+    leaves: u32,
+}
+
+/// The closest hits of rays, or `ANY` hits.
+#[inline(always)]
+pub(super) fn trace<L: SimdIsa, const ANY: bool>(
+    lanes: L,
+    wide: &Wide,
+    batch: &Batch<'_, '_>,
+    scratch: &mut Scratch,
+    answers: &mut impl Answers,
+) {
+    let count = batch.count.min(BATCH);
+    scratch.prepare(wide, batch);
+    for lane in 0..count {
+        answers.set(lane, None);
+    }
+    let mut tracer = Tracer { wide, batch, scratch, answers, places: Places::default(), ended: u32::MAX };
+    let mut lane_of = [0; SLOTS];
+    let mut rest = 0..count;
+    loop {
+        for slot in set_bits(std::mem::take(&mut tracer.ended)) {
+            let Some(lane) = rest.find(|&lane| tracer.scratch.is_valid[lane] != 0) else { break };
+            lane_of[slot] = lane;
+            tracer.scratch.stacks[slot].len = 0;
+            tracer.places.nodes |= 1 << slot;
+        }
+        let now = std::mem::take(&mut tracer.places);
+        if now.nodes | now.leaves == 0 {
+            return;
+        }
+        for slot in set_bits(now.nodes) {
+            tracer.open::<L, ANY>(lanes, slot, lane_of[slot] % BATCH);
+        }
+        for slot in set_bits(now.leaves) {
+            tracer.test_leaf::<L, ANY>(lanes, slot, lane_of[slot] % BATCH);
+        }
+    }
+}
+
+struct Tracer<'t, 'r, 'a, A> {
+    wide: &'t Wide,
+    batch: &'t Batch<'r, 'a>,
+    scratch: &'t mut Scratch,
+    answers: &'t mut A,
+    places: Places,
+    /// Slots whose rays are answered.
+    ended: u32,
+}
+
+impl<A: Answers> Tracer<'_, '_, '_, A> {
+    /// Opens the node that a ray is at.
+    #[inline(always)]
+    fn open<L: SimdIsa, const ANY: bool>(&mut self, lanes: L, slot: usize, lane: usize) {
+        let scratch = &mut *self.scratch;
+        let Some(node) = self.wide.nodes.get(scratch.next[lane].node_index()) else { return };
+        let ray = WideRay::new(scratch.slabs.get(lane));
+        // Not a negative zero: bits of distances are compared.
+        let t_min = self.batch.rays.t_min[lane] + 0.0;
+        let (_, enter) = lanes.enter(node, &ray, t_min, scratch.t_max[lane]);
+        let order =
+            if ANY { WideNode::BY_SLOT } else { node.orders[scratch.slabs.negative[lane] as usize % 8] };
+        let (entries, count) = lanes.ordered(enter, order, &node.children);
+        scratch.stacks[slot].push(entries, count);
+        self.advance(slot, lane);
+    }
+
+    /// Tests the leaf that a ray is at.
+    #[inline(always)]
+    fn test_leaf<L: SimdIsa, const ANY: bool>(&mut self, lanes: L, slot: usize, lane: usize) {
+        let is_answered = match self.scratch.next[lane].kind() {
+            ChildKind::Blocks { first, count } => {
+                let mut is_answered = false;
+                for block in &self.wide.blocks[first as usize..(first + count) as usize] {
+                    if self.test_block::<L, ANY>(lanes, block, lane) {
+                        is_answered = true;
+                        break;
+                    }
+                }
+                is_answered
+            }
+            ChildKind::Items { first, count } => self.test_items::<ANY>(first as usize..(first + count) as usize, lane),
+            ChildKind::Node(_) => false,
+        };
+        if is_answered {
+            self.ended |= 1 << slot;
+        } else {
+            self.advance(slot, lane);
+        }
+    }
+
+    /// Goes on to what is on top of the stack.
+    #[inline(always)]
+    fn advance(&mut self, slot: usize, lane: usize) {
+        let Some(child) = self.scratch.stacks[slot].pop(self.scratch.t_max[lane]) else {
+            self.ended |= 1 << slot;
+            return;
+        };
+        self.scratch.next[lane] = child;
+        let is_node = child.is_node();
+        self.places.nodes |= u32::from(is_node) << slot;
+        self.places.leaves |= u32::from(!is_node) << slot;
+        // Without a branch, which would be wrong half of the time. Of other items, an address that is not used.
+        let (node, block) = (address(&self.wide.nodes, child.node_index()), address(&self.wide.blocks, child.first()));
+        prefetch_lines(select_unpredictable(is_node, node, block), PREFETCHED_LINES);
+    }
+
+    /// Tests up to four triangles. True if the ray is answered.
+    #[inline(always)]
+    fn test_block<L: SimdIsa, const ANY: bool>(&mut self, lanes: L, block: &Block, lane: usize) -> bool {
+        let scratch = &mut *self.scratch;
+        let (rays, geometry) = (self.batch.rays, self.batch.accel.geometry());
+        let (t_min, t_max) = (rays.t_min[lane].into(), scratch.t_max[lane].into());
+        let ray = TriangleRay { kz: scratch.axes[lane], shear: scratch.shears.get(lane), t_min, t_max };
+        let Some(hits) = lanes.intersect(block, &ray) else { return false };
+        for i in set_bits(hits.mask) {
+            let ItemKind::Prim(shape, prim) = block.items[i].kind() else { continue };
+            let TriangleHit { t, u, v } = hits.get(i);
+            let hit = Hit { t, u, v, shape, prim, instance: Hit::NO_INSTANCE };
+            let is_better = ANY || self.answers.get(lane).is_none_or(|best| hit.is_before(&best));
+            if is_better && geometry.cutouts.counts(&geometry.shapes, scratch.keys[lane], &rays.get(lane), &hit) {
+                self.answers.set(lane, Some(hit));
+                scratch.t_max[lane] = t_max_after(&hit, scratch.t_max[lane]);
+                if ANY {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    /// Tests items other than triangles. True if the ray is answered.
+    #[inline(never)]
+    fn test_items<const ANY: bool>(&mut self, range: std::ops::Range<usize>, lane: usize) -> bool {
+        let ray = Ray { t_max: self.scratch.t_max[lane], ..self.batch.rays.get(lane) };
+        let counter = &mut NotCounted;
+        let mut query = Query::<_, _, ANY>::new(self.batch.accel, &ray, counter);
+        query.best = self.answers.get(lane);
+        let is_answered = self.wide.items[range].iter().any(|&item| query.test(item));
+        self.answers.set(lane, query.best);
+        self.scratch.t_max[lane] = query.t_max();
+        is_answered
+    }
+}
