@@ -84,7 +84,8 @@ fn shapes_in_packets_are_hit_where_embree_hits_them() {
     let mut shapes = placed_analytic_shapes(&mut rng, DVec3::ZERO);
     shapes.push(Shape::Mesh(soup(&mut rng, 2_000, 0.1)));
     let geometry = world(shapes);
-    let (hybrid, embree) = (HybridAccel::new(&geometry, 1, HybridOptions::default()).expect("it builds"), embree(&geometry));
+    let (hybrid, embree) =
+        (HybridAccel::new(&geometry, 1, HybridOptions::default()).expect("it builds"), embree(&geometry));
     assert!(hybrid.description().contains("packets"), "{}", hybrid.description());
     let rays = test_rays(&mut rng, &geometry, 20_000);
     let (mut hits, mut occluded) = (vec![None; rays.len()], vec![false; rays.len()]);

@@ -9,7 +9,9 @@ use super::bvh::{Bvh, BvhOptions};
 use super::kdtree::{KdTree, KdTreeOptions};
 use super::octree::Octree;
 use super::tree::TwoLevel;
-use super::{Accelerator, EmbreeAccel, EmbreeOptions, EmbreeQuality, HybridAccel, HybridOptions, LinearAccel, PacketBvh};
+use super::{
+    Accelerator, EmbreeAccel, EmbreeOptions, EmbreeQuality, HybridAccel, HybridOptions, LinearAccel, PacketBvh,
+};
 use crate::error::Result;
 use crate::geometry::Geometry;
 
@@ -18,8 +20,8 @@ use crate::geometry::Geometry;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum AccelKind {
-    /// [`Packets`](Self::Packets) for scenes of few primitives at rest, [`Hybrid`](Self::Hybrid) where few analytic
-    /// shapes stand among others, else Embree.
+    /// [`Packets`](Self::Packets) for scenes of few primitives at rest, [`Hybrid`](Self::Hybrid) for meshes at rest and
+    /// where few analytic shapes stand among others, else Embree.
     #[default]
     Auto,
     /// Embree.
@@ -28,7 +30,8 @@ pub enum AccelKind {
     Bvh(BvhOptions),
     /// A bounding volume hierarchy for packets of rays.
     Packets,
-    /// Embree, and a bounding volume hierarchy for packets of rays over analytic shapes of the world.
+    /// Embree or the bounding volume hierarchy of this crate, and one for packets of rays over analytic shapes of the
+    /// world.
     Hybrid(HybridOptions),
     /// A kd-tree.
     KdTree(KdTreeOptions),
@@ -64,17 +67,18 @@ impl AccelKind {
     pub const CHOICES: &'static [(&'static str, &'static str)] = &[
         (
             "auto",
-            "packets for at most 40 primitives beside spheres and cylinders, at rest, without holes; hybrid for at \
-             most 16 spheres, cylinders, disks and quads beside others; else embree",
+            "packets for at most 40 primitives beside spheres and cylinders, at rest, without holes; hybrid:bvh for \
+             up to 2 million triangles of meshes at rest, without instances, beside at most 16 spheres, cylinders, \
+             disks and quads; hybrid for at most 16 of these beside others; else embree",
         ),
-        ("embree", "Embree: fastest for large scenes; build quality medium, robust"),
+        ("embree", "Embree: fastest to build, for any scene; build quality medium, robust"),
         ("embree:low", "built faster, traced slower"),
         ("embree:high", "spatial splits: built slower, traced faster"),
         ("embree:fast", "not robust: rays may slip through edges; for comparisons"),
         ("embree:compact", "less memory, traced slower"),
         ("packets", "bounding volume hierarchy traversed by up to 16 rays at once: fastest for few primitives"),
         ("hybrid", "embree, with packets for spheres, cylinders, disks and quads that have no holes"),
-        ("hybrid:bvh", "bvh in place of embree"),
+        ("hybrid:bvh", "bvh in place of embree, and packets for floors and walls too"),
         ("bvh", "bounding volume hierarchy: binned surface area heuristic, eight boxes a node, SIMD"),
         ("bvh:binary", "two boxes a node, no SIMD"),
         ("kdtree", "kd-tree: surface area heuristic with a bonus for empty space"),

@@ -191,8 +191,7 @@ impl<A: Answers> Tracer<'_, '_, '_, A> {
         // Not a negative zero: bits of distances are compared.
         let t_min = self.batch.rays.t_min[lane] + 0.0;
         let (_, enter) = lanes.enter(node, &ray, t_min, scratch.t_max[lane]);
-        let order =
-            if ANY { WideNode::BY_SLOT } else { node.orders[scratch.slabs.negative[lane] as usize % 8] };
+        let order = if ANY { WideNode::BY_SLOT } else { node.orders[scratch.slabs.negative[lane] as usize % 8] };
         let (entries, count) = lanes.ordered(enter, order, &node.children);
         scratch.stacks[slot].push(entries, count);
         self.advance(slot, lane);

@@ -1,6 +1,8 @@
 //! The binary hierarchy: binned surface area heuristic (Wald, "On fast Construction of SAH-based Bounding Volume
 //! Hierarchies"), built in parallel, the same for any number of threads.
 
+use glam::Vec3A;
+
 use crate::math::{Aabb, Vec3};
 
 /// Bins along each axis.
@@ -70,23 +72,49 @@ struct Builder<F> {
     is_alone: F,
 }
 
+/// Padded vectors take one instruction each.
 #[derive(Clone, Copy)]
 struct Bin {
-    bounds: Aabb,
+    min: Vec3A,
+    max: Vec3A,
     count: u32,
+}
+
+impl Bin {
+    const EMPTY: Self = Self { min: Vec3A::INFINITY, max: Vec3A::NEG_INFINITY, count: 0 };
+
+    /// One box.
+    #[inline]
+    fn of(bounds: &Aabb) -> Self {
+        Self { min: bounds.min.into(), max: bounds.max.into(), count: 1 }
+    }
+
+    #[inline]
+    fn union(&self, other: &Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max), count: self.count + other.count }
+    }
+
+    fn bounds(&self) -> Aabb {
+        Aabb { min: self.min.into(), max: self.max.into() }
+    }
+
+    /// The cost of a leaf, by area.
+    fn cost(&self) -> f32 {
+        self.bounds().area() * blocks(self.count)
+    }
 }
 
 impl<F: Fn(u32) -> bool + Sync> Builder<F> {
     /// Builds over `refs`, which start at `first`, into `nodes`, which start at `base`.
     fn build(&self, nodes: &mut [BinaryNode], refs: &mut [Reference], first: usize, base: usize, depth: u32) {
-        let bounds = refs.iter().fold(Aabb::EMPTY, |b, r| b.union(&r.bounds));
-        let split = if self.may_be_leaf(refs) && refs.len() <= 1 { None } else { self.split(refs, &bounds, depth) };
+        let extent = Extent::of(refs);
+        let split = if self.may_be_leaf(refs) && refs.len() <= 1 { None } else { self.split(refs, &extent, depth) };
         let Some(middle) = split else {
-            nodes[0] = BinaryNode { bounds, link: first as u32, count: refs.len() as u32 };
+            nodes[0] = BinaryNode { bounds: extent.bounds, link: first as u32, count: refs.len() as u32 };
             return;
         };
         let second = 2 * middle;
-        nodes[0] = BinaryNode { bounds, link: (base + second) as u32, count: 0 };
+        nodes[0] = BinaryNode { bounds: extent.bounds, link: (base + second) as u32, count: 0 };
         let (left_nodes, right_nodes) = nodes[1..].split_at_mut(second - 1);
         let (left, right) = refs.split_at_mut(middle);
         let parallel = left.len() + right.len() > PARALLEL;
@@ -105,13 +133,13 @@ impl<F: Fn(u32) -> bool + Sync> Builder<F> {
     }
 
     /// Sorts the references into two parts and gives the size of the first; `None` if they are better left together.
-    fn split(&self, refs: &mut [Reference], bounds: &Aabb, depth: u32) -> Option<usize> {
-        let centroids = refs.iter().fold(Aabb::EMPTY, |b, r| b.extended(r.bounds.center()));
-        let best = if depth < MAX_SAH_DEPTH { best_split(refs, &centroids) } else { None };
+    fn split(&self, refs: &mut [Reference], extent: &Extent, depth: u32) -> Option<usize> {
+        let Extent { bounds, centers } = extent;
+        let best = if depth < MAX_SAH_DEPTH { best_split(refs, centers) } else { None };
         let leaf_cost = bounds.area() * blocks(refs.len() as u32);
         match best {
             Some(split) if !self.may_be_leaf(refs) || bounds.area() + split.cost < leaf_cost => {
-                let binning = Binning::new(&centroids, split.axis);
+                let binning = Binning::new(centers, split.axis);
                 let middle = partition(refs, |r| binning.bin(r) < split.bin);
                 (middle > 0 && middle < refs.len()).then_some(middle).or_else(|| halve(refs))
             }
@@ -125,6 +153,25 @@ impl<F: Fn(u32) -> bool + Sync> Builder<F> {
 #[allow(clippy::unnecessary_wraps)]
 fn halve(refs: &mut [Reference]) -> Option<usize> {
     Some(refs.len() / 2)
+}
+
+/// Where references are.
+struct Extent {
+    bounds: Aabb,
+    /// The bounds of the centers of their boxes.
+    centers: Aabb,
+}
+
+impl Extent {
+    fn of(refs: &[Reference]) -> Self {
+        let (mut all, mut centers) = (Bin::EMPTY, Bin::EMPTY);
+        for reference in refs {
+            all = all.union(&Bin::of(&reference.bounds));
+            let center = reference.bounds.center();
+            centers = centers.union(&Bin::of(&Aabb { min: center, max: center }));
+        }
+        Self { bounds: all.bounds(), centers: centers.bounds() }
+    }
 }
 
 fn blocks(count: u32) -> f32 {
@@ -160,32 +207,33 @@ impl Binning {
 }
 
 fn best_split(refs: &[Reference], centroids: &Aabb) -> Option<Split> {
-    const EMPTY: Bin = Bin { bounds: Aabb::EMPTY, count: 0 };
+    let binnings = [0, 1, 2].map(|axis| Binning::new(centroids, axis));
+    let mut bins = [[Bin::EMPTY; BINS]; 3];
+    for reference in refs {
+        let one = Bin::of(&reference.bounds);
+        for (bins, binning) in bins.iter_mut().zip(&binnings) {
+            let bin = &mut bins[binning.bin(reference)];
+            *bin = bin.union(&one);
+        }
+    }
     let mut best: Option<Split> = None;
-    for axis in 0..3 {
+    for (axis, bins) in bins.iter().enumerate() {
         if !(centroids.max[axis] > centroids.min[axis]) {
             continue;
         }
-        let binning = Binning::new(centroids, axis);
-        let mut bins = [EMPTY; BINS];
-        for reference in refs {
-            let bin = &mut bins[binning.bin(reference)];
-            bin.bounds = bin.bounds.union(&reference.bounds);
-            bin.count += 1;
-        }
         let mut right_cost = [0.0; BINS];
-        let mut right = EMPTY;
+        let mut right = Bin::EMPTY;
         for i in (1..BINS).rev() {
-            right = Bin { bounds: right.bounds.union(&bins[i].bounds), count: right.count + bins[i].count };
-            right_cost[i] = if right.count == 0 { f32::INFINITY } else { right.bounds.area() * blocks(right.count) };
+            right = right.union(&bins[i]);
+            right_cost[i] = if right.count == 0 { f32::INFINITY } else { right.cost() };
         }
-        let mut left = EMPTY;
+        let mut left = Bin::EMPTY;
         for i in 1..BINS {
-            left = Bin { bounds: left.bounds.union(&bins[i - 1].bounds), count: left.count + bins[i - 1].count };
+            left = left.union(&bins[i - 1]);
             if left.count == 0 {
                 continue;
             }
-            let cost = left.bounds.area() * blocks(left.count) + right_cost[i];
+            let cost = left.cost() + right_cost[i];
             if cost < best.as_ref().map_or(f32::INFINITY, |b| b.cost) {
                 best = Some(Split { axis, bin: i, cost });
             }

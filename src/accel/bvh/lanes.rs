@@ -167,8 +167,10 @@ impl SimdIsa for V3 {
         let children = x._mm256_permutevar8x32_epi32(pulp::cast(children), slots);
         let low = x._mm256_unpacklo_epi32(distances, children);
         let high = x._mm256_unpackhi_epi32(distances, children);
-        let halves: [u64; WIDTH] =
-            pulp::cast([x._mm256_permute2x128_si256::<0x20>(low, high), x._mm256_permute2x128_si256::<0x31>(low, high)]);
+        let halves: [u64; WIDTH] = pulp::cast([
+            x._mm256_permute2x128_si256::<0x20>(low, high),
+            x._mm256_permute2x128_si256::<0x31>(low, high),
+        ]);
         ([0, 1, 2, 3, 4, 5, 6, 7].map(|i| Entry(halves[i])), mask.count_ones())
     }
 

@@ -2,10 +2,10 @@ use super::build::{BLOCK, MAX_LEAF};
 use super::lanes::{Portable, SimdIsa, WideRay};
 use super::wide::{Block, Entry, Wide, WideNode};
 use super::*;
-use crate::accel::{Accelerator, Coherence, HitRows};
 use crate::accel::inspect::{Inspect, Item, StructureStats};
 use crate::accel::tree::testing::Sequence;
 use crate::accel::tree::{SlabRay, TwoLevel};
+use crate::accel::{Accelerator, Coherence, HitRows};
 use crate::geometry::{
     Analytic, Geometry, Hit, Mesh, Shape, Sphere, TransformedShape, TriangleHit, TrianglePoints, TriangleRay,
 };

@@ -14,8 +14,8 @@ pub(super) use query::{Counter, NotCounted, Query, t_max_after};
 pub(super) use slab::{SlabRay, SlabRows};
 pub(super) use two_level::TwoLevel;
 
-use super::inspect::NodeInfo;
 use super::HitRows;
+use super::inspect::NodeInfo;
 use crate::geometry::Hit;
 use crate::math::rows::BATCH;
 use crate::math::{Aabb, RayRows};

@@ -1,8 +1,8 @@
 //! A tree over the world, and one over each object that instances place.
 
 use super::{Answers, Counter, Items, NotCounted, Query, Tree};
-use crate::accel::{Accelerator, Coherence, HitRows};
 use crate::accel::inspect::{Inspect, NodeInfo, TraversalCounts};
+use crate::accel::{Accelerator, Coherence, HitRows};
 use crate::geometry::{Geometry, Hit, Instance};
 use crate::id::{ObjectId, ShapeId};
 use crate::math::float::UNIT_ROUNDOFF;

@@ -56,7 +56,7 @@ const FAR: DVec3 = DVec3::new(148_376.0, 1_234.0, -223_423.0);
 
 type Named<'g> = (&'static str, Box<dyn Accelerator + 'g>);
 
-/// Every accelerator but `hybrid`, whose triangles are Embree's, and `hybrid:bvh`; the linear one only for few triangles.
+/// Every accelerator but `hybrid`, whose triangles are Embree's; the linear one only for few triangles.
 fn accelerators(geometry: &Geometry) -> Vec<Named<'_>> {
     const FEW: usize = 5_000;
     let prims: usize = geometry.shapes.iter().map(Shape::prim_count).sum();

@@ -11,7 +11,9 @@ use moving::f8_motion_bounds;
 use visits::f9_visits;
 
 use super::geometry::{Rng, grid, ids, ray, world};
-use super::scenes::{all, at_times, build, hybrid, hybrid_bvh, moving_scene, own, packets, path_rays, same, scenes, test_rays};
+use super::scenes::{
+    all, at_times, build, hybrid, hybrid_bvh, moving_scene, own, packets, path_rays, same, scenes, test_rays,
+};
 use super::{Effort, Faults, Outcome};
 use crate::accel::{AccelKind, Accelerator, Coherence, LinearAccel};
 use crate::geometry::{Geometry, Hit, Shape};
