@@ -47,8 +47,10 @@ def blocks():
     place = np.random.default_rng(2)
     for i in range(10):
         color = (0.8 if i % 3 == 0 else 0.2, 0.4, 0.7)
-        location = (place.uniform(-2, 2), place.uniform(-1, 3), 0.5)
-        scenes.box((0.5, 0.5, 1), location, scenes.diffuse(color, f"color {i}"), name=f"box {i}")
+        # Some overlap: at one height, which of their tops is seen would not be defined.
+        height = 1 - 0.02 * i
+        location = (place.uniform(-2, 2), place.uniform(-1, 3), 0.5 * height)
+        scenes.box((0.5, 0.5, height), location, scenes.diffuse(color, f"color {i}"), name=f"box {i}")
     scenes.lamp("AREA", (3, -3, 4), (0, 0, 0), energy=400, size=1.5)
     scenes.sky(0.4)
     return scenes.camera((0, -5, 2), (0, 0, 0.5), lens=40)
