@@ -15,16 +15,16 @@ use crate::math::{Aabb, Ray, RayRows};
 /// Up to this number of analytic shapes, packets beside Embree are mostly faster (`docs/accelerators.md`).
 const FEW: usize = 16;
 
-/// The most triangles of a mesh that is traced in packets.
-const MAX_PANEL: usize = 48;
+/// The most triangles of a mesh that is traced in packets: a floor, or walls.
+const MAX_MESH_TRIANGLES: usize = 48;
 
 /// The most triangles of all such meshes.
-const MAX_PANELS: usize = 80;
+const MAX_WALL_TRIANGLES: usize = 80;
 
 /// The least area of the box around such a mesh, in areas of the box around the world.
-const MIN_PANEL_AREA: f32 = 0.02;
+const MIN_WALL_AREA: f32 = 0.02;
 
-/// Above this number of triangles, Embree's shorter build outweighs what the BVH saves.
+/// With so many triangles, the build of the BVH takes twice the memory of Embree's (`docs/accelerators.md`).
 const MAX_TRIANGLES: usize = 2_000_000;
 
 /// What traces what is not in packets.
@@ -51,9 +51,9 @@ impl<'g> HybridAccel<'g> {
     /// # Errors
     /// As [`EmbreeAccel::new`].
     pub fn new(geometry: &'g Geometry, threads: usize, options: HybridOptions) -> Result<Self> {
-        let panels = if options.bvh { panels(geometry) } else { Vec::new() };
+        let walls = if options.bvh { walls(geometry) } else { Vec::new() };
         let (mut shapes, mut others): (Vec<_>, Vec<_>) =
-            geometry.world.iter().partition(|&&id| is_traced_in_packets(geometry, id) || panels.contains(&id));
+            geometry.world.iter().partition(|&&id| is_traced_in_packets(geometry, id) || walls.contains(&id));
         let packets = Hierarchy::new(geometry, &shapes, &geometry.bounds());
         if packets.is_none() {
             others.append(&mut shapes);
@@ -119,23 +119,25 @@ fn is_resting_mesh(shape: &Shape) -> bool {
 }
 
 /// Floors and walls: the largest meshes of few triangles, which rays of all directions meet.
-fn panels(geometry: &Geometry) -> Vec<ShapeId> {
+fn walls(geometry: &Geometry) -> Vec<ShapeId> {
     let area = |id: ShapeId| geometry.shape(id).bounds().area();
-    let min_area = MIN_PANEL_AREA * geometry.bounds().area();
-    let is_panel = |id: &ShapeId| {
+    let min_area = MIN_WALL_AREA * geometry.bounds().area();
+    let is_wall = |id: &ShapeId| {
         is_resting_mesh(geometry.shape(*id))
-            && geometry.shape(*id).prim_count() <= MAX_PANEL
+            && geometry.shape(*id).prim_count() <= MAX_MESH_TRIANGLES
             && area(*id) > min_area
             && !geometry.cutouts.has_holes(*id)
     };
-    let mut panels: Vec<ShapeId> = geometry.world.iter().copied().filter(is_panel).collect();
-    panels.sort_by(|&a, &b| area(b).total_cmp(&area(a)));
+    let mut walls: Vec<ShapeId> = geometry.world.iter().copied().filter(is_wall).collect();
+    walls.sort_by(|&a, &b| area(b).total_cmp(&area(a)));
     let mut triangles = 0;
-    panels.retain(|&id| {
-        triangles += geometry.shape(id).prim_count();
-        triangles <= MAX_PANELS
+    walls.retain(|&id| {
+        let sum = triangles + geometry.shape(id).prim_count();
+        let fits = sum <= MAX_WALL_TRIANGLES;
+        triangles = if fits { sum } else { triangles };
+        fits
     });
-    panels
+    walls
 }
 
 impl Accelerator for HybridAccel<'_> {

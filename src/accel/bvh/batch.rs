@@ -1,6 +1,6 @@
-//! Many rays through the wide hierarchy in turn: while the memory that one of them needs is on its way, others advance.
+//! Interleaved traversal of the wide hierarchy: while the memory that one ray needs is on its way, others advance.
 //!
-//! Rays are prepared in rows. Then up to [`SLOTS`] are on their way at once: a round opens a node for each ray that is
+//! Rays are prepared in rows. Then up to [`SLOTS`] are traversed at once: a round opens a node for each ray that is
 //! at one, and tests a leaf for each ray that is at one, so that few branches depend on single rays; what a ray needs
 //! in the next round is prefetched. Answers are those of single rays, bit for bit.
 
@@ -18,7 +18,7 @@ use crate::math::prefetch::{address, prefetch_lines};
 use crate::math::rows::{BATCH, Row, WIDTH as ROW_WIDTH, whole_vectors};
 use crate::math::{Ray, RayRows};
 
-/// Rays on their way at once: a bit each.
+/// Rays that are traversed at once: a bit each.
 const SLOTS: usize = 32;
 
 /// Lines of the caches that a node fills; a block fills one less.
@@ -95,7 +95,7 @@ impl Scratch {
     }
 }
 
-/// Children that wait. An odd number of cache lines, so that the tops of all stacks are not in the same few sets.
+/// Children that wait. Not a power of two long: else the tops of all stacks were in the same few sets of the cache.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 struct Stack {
@@ -107,10 +107,9 @@ impl Stack {
     /// Adds the first `count` entries.
     #[inline(always)]
     fn push(&mut self, entries: [Entry; WIDTH], count: u32) {
-        if let Some(top) = self.entries.get_mut(self.len..).and_then(|free| free.first_chunk_mut()) {
-            *top = entries;
-            self.len += count as usize;
-        }
+        // There is room: `Bvh::wide` bounds the depth.
+        self.entries[self.len..self.len + WIDTH].copy_from_slice(&entries);
+        self.len += count as usize;
     }
 
     /// Takes entries from the top, up to one that is entered before `t_max`.
@@ -186,7 +185,7 @@ impl<A: Answers> Tracer<'_, '_, '_, A> {
     #[inline(always)]
     fn open<L: SimdIsa, const ANY: bool>(&mut self, lanes: L, slot: usize, lane: usize) {
         let scratch = &mut *self.scratch;
-        let Some(node) = self.wide.nodes.get(scratch.next[lane].node_index()) else { return };
+        let node = &self.wide.nodes[scratch.next[lane].node_index()];
         let ray = WideRay::new(scratch.slabs.get(lane));
         // Not a negative zero: bits of distances are compared.
         let t_min = self.batch.rays.t_min[lane] + 0.0;
