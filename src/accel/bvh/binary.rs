@@ -3,7 +3,7 @@
 use arrayvec::ArrayVec;
 
 use super::Bvh;
-use super::build::{Binary, BinaryNode};
+use super::build::{Binary, BinaryKind, BinaryNode};
 use crate::accel::inspect::{Item, NodeInfo};
 use crate::accel::tree::{Counter, Items, Query, SlabRay};
 use crate::math::Aabb;
@@ -31,10 +31,6 @@ impl BinaryTree {
         size_of_val(self.nodes.as_slice()) + size_of_val(self.items.as_slice())
     }
 
-    fn leaf_items(&self, node: &BinaryNode) -> &[Item] {
-        &self.items[node.link as usize..(node.link + node.count) as usize]
-    }
-
     pub fn traverse<C: Counter, const ANY: bool>(&self, query: &mut Query<'_, Bvh, C, ANY>) {
         let slab = SlabRay::new(&query.ray, &self.bounds(), query.slack());
         let t_min = query.ray.t_min;
@@ -48,14 +44,15 @@ impl BinaryTree {
                 continue;
             }
             query.counter.nodes(1);
-            let node = &self.nodes[index];
-            if node.count > 0 {
-                if self.leaf_items(node).iter().any(|&item| query.test(item)) {
-                    return;
+            let children = match self.nodes[index].kind() {
+                BinaryKind::Leaf(range) => {
+                    if self.items[range].iter().any(|&item| query.test(item)) {
+                        return;
+                    }
+                    continue;
                 }
-                continue;
-            }
-            let children = [index + 1, node.link as usize].map(|child| (enter(child, query.t_max()), child));
+                BinaryKind::Inner(children) => children.map(|child| (enter(child, query.t_max()), child)),
+            };
             match children {
                 [(Some(a), left), (Some(b), right)] if a <= b => stack.extend([(b, right), (a, left)]),
                 [(Some(a), left), (Some(b), right)] => stack.extend([(a, left), (b, right)]),
@@ -69,11 +66,14 @@ impl BinaryTree {
         let mut open = vec![(0, 0)];
         while let Some((index, depth)) = open.pop() {
             let node = &self.nodes[index];
-            if node.count > 0 {
-                visit(&NodeInfo { bounds: node.bounds, depth, children: 0, items: self.leaf_items(node) });
-            } else {
-                visit(&NodeInfo { bounds: node.bounds, depth, children: 2, items: &[] });
-                open.extend([(node.link as usize, depth + 1), (index + 1, depth + 1)]);
+            match node.kind() {
+                BinaryKind::Leaf(range) => {
+                    visit(&NodeInfo { bounds: node.bounds, depth, children: 0, items: &self.items[range] });
+                }
+                BinaryKind::Inner([first, second]) => {
+                    visit(&NodeInfo { bounds: node.bounds, depth, children: 2, items: &[] });
+                    open.extend([(second, depth + 1), (first, depth + 1)]);
+                }
             }
         }
     }

@@ -1,9 +1,11 @@
 //! The binary hierarchy: binned surface area heuristic (Wald, "On fast Construction of SAH-based Bounding Volume
 //! Hierarchies"), built in parallel, the same for any number of threads.
 
+use std::ops::Range;
+
 use glam::Vec3A;
 
-use crate::math::{Aabb, Vec3};
+use crate::math::Aabb;
 
 /// Bins along each axis.
 const BINS: usize = 16;
@@ -15,7 +17,7 @@ const PARALLEL: usize = 8_192;
 const MAX_SAH_DEPTH: u32 = 48;
 
 /// Cost of a leaf's test of up to [`BLOCK`] items, in units of the cost of a node.
-const BLOCK_COST: f32 = 1.2;
+pub(super) const BLOCK_COST: f32 = 1.2;
 
 /// Items that are tested side by side.
 pub(super) const BLOCK: usize = 4;
@@ -34,13 +36,43 @@ pub(in crate::accel) struct Reference {
 #[derive(Clone, Copy, Debug)]
 pub(in crate::accel) struct BinaryNode {
     pub bounds: Aabb,
-    /// Of a leaf, its first reference; of an inner node, its second child. The first child follows its parent.
-    pub link: u32,
-    /// How many references a leaf has; zero on inner nodes.
-    pub count: u32,
+    /// Of a leaf, [`LEAF`] with its first reference, and how many it has; of an inner node, its children.
+    links: [u32; 2],
 }
 
-const UNUSED: BinaryNode = BinaryNode { bounds: Aabb::EMPTY, link: 0, count: 0 };
+/// What a [`BinaryNode`] has below it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(in crate::accel) enum BinaryKind {
+    /// The indices of two nodes.
+    Inner([usize; 2]),
+    /// References.
+    Leaf(Range<usize>),
+}
+
+/// Marks the first link of a leaf.
+const LEAF: u32 = 1 << 31;
+
+impl BinaryNode {
+    const UNUSED: Self = Self { bounds: Aabb::EMPTY, links: [LEAF, 0] };
+
+    pub fn inner(bounds: Aabb, children: [usize; 2]) -> Self {
+        Self { bounds, links: children.map(|child| child as u32) }
+    }
+
+    fn leaf(bounds: Aabb, first: usize, count: usize) -> Self {
+        Self { bounds, links: [LEAF | first as u32, count as u32] }
+    }
+
+    #[inline(always)]
+    pub fn kind(&self) -> BinaryKind {
+        let [first, second] = self.links.map(|link| (link & !LEAF) as usize);
+        if self.links[0] & LEAF == 0 {
+            BinaryKind::Inner([first, second])
+        } else {
+            BinaryKind::Leaf(first..first + second)
+        }
+    }
+}
 
 /// A binary hierarchy; the root is the first node.
 pub(in crate::accel) struct Binary {
@@ -62,7 +94,7 @@ impl Binary {
     }
 
     fn from_depth(mut references: Vec<Reference>, is_alone: impl Fn(u32) -> bool + Sync, depth: u32) -> Self {
-        let mut nodes = vec![UNUSED; 2 * references.len() - 1];
+        let mut nodes = vec![BinaryNode::UNUSED; 2 * references.len() - 1];
         Builder { is_alone }.build(&mut nodes, &mut references, 0, 0, depth);
         Self { nodes, references }
     }
@@ -110,11 +142,11 @@ impl<F: Fn(u32) -> bool + Sync> Builder<F> {
         let extent = Extent::of(refs);
         let split = if self.may_be_leaf(refs) && refs.len() <= 1 { None } else { self.split(refs, &extent, depth) };
         let Some(middle) = split else {
-            nodes[0] = BinaryNode { bounds: extent.bounds, link: first as u32, count: refs.len() as u32 };
+            nodes[0] = BinaryNode::leaf(extent.bounds, first, refs.len());
             return;
         };
         let second = 2 * middle;
-        nodes[0] = BinaryNode { bounds: extent.bounds, link: (base + second) as u32, count: 0 };
+        nodes[0] = BinaryNode::inner(extent.bounds, [base + 1, base + second]);
         let (left_nodes, right_nodes) = nodes[1..].split_at_mut(second - 1);
         let (left, right) = refs.split_at_mut(middle);
         let parallel = left.len() + right.len() > PARALLEL;
@@ -254,10 +286,4 @@ fn partition(refs: &mut [Reference], is_first: impl Fn(&Reference) -> bool) -> u
         }
     }
     i
-}
-
-/// The largest half-area split is what the wide form opens first.
-pub(super) fn half_area(bounds: &Aabb) -> f32 {
-    let d: Vec3 = bounds.size();
-    d.x * d.y + d.y * d.z + d.z * d.x
 }

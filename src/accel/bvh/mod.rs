@@ -3,7 +3,9 @@
 mod batch;
 mod binary;
 mod build;
+mod collapse;
 mod lanes;
+mod reinsertion;
 #[cfg(test)]
 mod tests;
 mod traverse;
@@ -16,7 +18,7 @@ use super::tree::{Answers, Counter, Items, Query, Tree, TwoLevel};
 use crate::math::{Aabb, RayRows};
 use batch::{Batch, Scratch};
 use binary::BinaryTree;
-pub(super) use build::{Binary, MAX_LEAF, Reference};
+pub(super) use build::{Binary, BinaryKind, MAX_LEAF, Reference};
 use lanes::Portable;
 use wide::{ChildKind, STACK, WIDTH, Wide};
 
@@ -95,7 +97,9 @@ fn is_alone(items: &Items<'_>, item: u32) -> bool {
 }
 
 fn binary(items: &Items<'_>) -> Binary {
-    Binary::new(references(items), |item| is_alone(items, item))
+    let mut binary = Binary::new(references(items), |item| is_alone(items, item));
+    reinsertion::optimize(&mut binary);
+    binary
 }
 
 impl Tree for Bvh {

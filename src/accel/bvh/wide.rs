@@ -1,6 +1,7 @@
 //! The wide hierarchy: eight boxes a node, triangles in blocks.
 
-use super::build::{BLOCK, Binary, BinaryNode, half_area};
+use super::build::{BLOCK, Binary};
+use super::collapse::Collapse;
 use crate::accel::inspect::Item;
 use crate::accel::tree::Items;
 use crate::math::Aabb;
@@ -174,27 +175,26 @@ pub(super) struct Wide {
 }
 
 impl Wide {
-    /// From a binary hierarchy, opening the child with the largest area until there are eight.
+    /// From a binary hierarchy.
     pub fn new(binary: &Binary, items: &Items<'_>) -> Self {
+        let collapse = Collapse::new(binary, |item| items.triangle(item as usize).is_none());
         let mut wide =
             Self { nodes: Vec::new(), blocks: Vec::new(), items: Vec::new(), bounds: binary.nodes[0].bounds, depth: 0 };
-        wide.nodes.reserve(binary.references.len() / 8 + 1);
+        wide.nodes.reserve(binary.references.len() / 16 + 1);
         wide.blocks.reserve(binary.references.len() / 3 + 1);
         wide.nodes.push(WideNode::EMPTY);
         let mut open = vec![(0, 0, 1)];
         while let Some((source, target, depth)) = open.pop() {
             wide.depth = wide.depth.max(depth);
-            let (children, count) = gather(binary, source);
-            for (slot, &index) in children[..count].iter().enumerate() {
-                let node = &binary.nodes[index];
-                let child = if node.count == 0 {
+            for (slot, index) in collapse.children(source).into_iter().enumerate() {
+                let child = if collapse.is_leaf(index) {
+                    wide.leaf(&collapse.references(index), items)
+                } else {
                     wide.nodes.push(WideNode::EMPTY);
                     open.push((index, wide.nodes.len() - 1, depth + 1));
                     Child::node(wide.nodes.len() - 1)
-                } else {
-                    wide.leaf(binary, node, items)
                 };
-                wide.nodes[target].set(slot, &node.bounds, child);
+                wide.nodes[target].set(slot, &binary.nodes[index].bounds, child);
             }
             wide.nodes[target].set_orders();
         }
@@ -203,22 +203,21 @@ impl Wide {
         wide
     }
 
-    fn leaf(&mut self, binary: &Binary, node: &BinaryNode, items: &Items<'_>) -> Child {
-        let references = &binary.references[node.link as usize..][..node.count as usize];
-        if items.triangle(references[0].item as usize).is_none() {
+    fn leaf(&mut self, references: &[u32], items: &Items<'_>) -> Child {
+        if items.triangle(references[0] as usize).is_none() {
             let first = self.items.len();
-            self.items.extend(references.iter().map(|r| items.list[r.item as usize]));
+            self.items.extend(references.iter().map(|&item| items.list[item as usize]));
             return Child::run(2, first, references.len());
         }
         let first = self.blocks.len();
         for chunk in references.chunks(BLOCK) {
             let mut block = Block {
                 corners: [[[0.0; BLOCK]; 3]; 3],
-                items: [items.list[chunk[0].item as usize]; BLOCK],
+                items: [items.list[chunk[0] as usize]; BLOCK],
                 count: chunk.len() as u32,
             };
             for lane in 0..BLOCK {
-                let item = chunk.get(lane).unwrap_or(&chunk[0]).item as usize;
+                let item = *chunk.get(lane).unwrap_or(&chunk[0]) as usize;
                 let Some(points) = items.triangle(item) else { continue };
                 block.items[lane] = items.list[item];
                 for (corner, p) in [points.a, points.b, points.c].into_iter().enumerate() {
@@ -236,20 +235,4 @@ impl Wide {
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.nodes.as_slice()) + size_of_val(self.blocks.as_slice()) + size_of_val(self.items.as_slice())
     }
-}
-
-/// Up to eight nodes below `root` that together hold all of it; the root itself if it is a leaf.
-fn gather(binary: &Binary, root: usize) -> ([usize; WIDTH], usize) {
-    let mut children = [root; WIDTH];
-    let mut count = 1;
-    while count < WIDTH {
-        let inner = (0..count).filter(|&i| binary.nodes[children[i]].count == 0);
-        let area = |i: &usize| half_area(&binary.nodes[children[*i]].bounds);
-        let Some(largest) = inner.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
-        let node = children[largest];
-        children[largest] = node + 1;
-        children[count] = binary.nodes[node].link as usize;
-        count += 1;
-    }
-    (children, count)
 }

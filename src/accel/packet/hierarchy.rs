@@ -3,7 +3,7 @@
 use super::lanes::BoundingSphere;
 use super::primitives::{Polygon, PrimRecord};
 use super::shapes::PacketShape;
-use crate::accel::bvh::{Binary, MAX_LEAF, Reference};
+use crate::accel::bvh::{Binary, BinaryKind, MAX_LEAF, Reference};
 use crate::accel::inspect::ItemKind;
 use crate::accel::tree::Items;
 use crate::geometry::{Geometry, Shape, TrianglePoints};
@@ -115,17 +115,17 @@ fn nodes(binary: &Binary, sphere: &BoundingSphere) -> Vec<Node> {
             let children: &mut [u32; 2] = children;
             children[side as usize] = count;
         }
-        let content = if from.count > 0 {
-            NodeContent::Primitives { first: from.link, count: from.count }
-        } else {
-            let pair = [source + 1, from.link as usize];
-            let [a, b] = pair.map(|child| binary.nodes[child].bounds.center());
-            let apart = (b - a).abs();
-            let axis = (0..3).max_by(|&i, &j| apart[i].total_cmp(&apart[j])).unwrap_or(0);
-            let [low, high] = if a[axis] <= b[axis] { pair } else { [pair[1], pair[0]] };
-            let this = nodes.len();
-            open.extend([(low, Some((this as u32, 0u32))), (high, Some((this as u32, 1)))]);
-            NodeContent::Nodes { children: [0; 2], axis: axis as u32 }
+        let content = match from.kind() {
+            BinaryKind::Leaf(range) => NodeContent::Primitives { first: range.start as u32, count: range.len() as u32 },
+            BinaryKind::Inner(pair) => {
+                let [a, b] = pair.map(|child| binary.nodes[child].bounds.center());
+                let apart = (b - a).abs();
+                let axis = (0..3).max_by(|&i, &j| apart[i].total_cmp(&apart[j])).unwrap_or(0);
+                let [low, high] = if a[axis] <= b[axis] { pair } else { [pair[1], pair[0]] };
+                let this = nodes.len();
+                open.extend([(low, Some((this as u32, 0u32))), (high, Some((this as u32, 1)))]);
+                NodeContent::Nodes { children: [0; 2], axis: axis as u32 }
+            }
         };
         nodes.push(Node { bounds: sphere.widened(&from.bounds), content });
     }

@@ -1,0 +1,206 @@
+//! Nodes of a binary hierarchy are taken out and put back where boxes grow least (Bittner, Hapala, Havran, "Fast
+//! Insertion-Based Optimization of Bounding Volume Hierarchies"; nodes in the order of their areas).
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use super::build::{Binary, BinaryKind, BinaryNode};
+
+/// How often the largest nodes are put elsewhere.
+const PASSES: usize = 5;
+
+/// How many of them.
+const MOVED: usize = 4_000;
+
+/// Places looked at for a node; mostly 30 to 70 are.
+const MAX_PLACES: usize = 512;
+
+/// Deeper trees are left as they were.
+const MAX_DEPTH: usize = 100;
+
+const ROOT: usize = 0;
+
+/// Moves nodes while the boxes of the hierarchy shrink.
+pub(super) fn optimize(binary: &mut Binary) {
+    if !binary.nodes[ROOT].bounds.area().is_finite() {
+        return;
+    }
+    let mut optimizer = Optimizer::new(&mut binary.nodes);
+    let mut moves = Vec::new();
+    for _ in 0..PASSES {
+        for node in optimizer.largest(MOVED) {
+            moves.extend(optimizer.reinsert(node).map(|sibling| (node, sibling)));
+        }
+    }
+    if optimizer.depth() > MAX_DEPTH {
+        for (node, sibling) in moves.into_iter().rev() {
+            optimizer.remove(node);
+            optimizer.insert(node, sibling);
+        }
+    }
+}
+
+struct Optimizer<'b> {
+    nodes: &'b mut [BinaryNode],
+    /// Of each node but the root.
+    parents: Vec<u32>,
+    open: BinaryHeap<Place>,
+}
+
+/// A subtree to put a node into.
+struct Place {
+    /// How much the boxes above it grow.
+    growth: f32,
+    index: usize,
+}
+
+/// The largest is the place with the least growth.
+impl Ord for Place {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.growth.total_cmp(&self.growth).then(other.index.cmp(&self.index))
+    }
+}
+
+impl PartialOrd for Place {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Place {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Place {}
+
+impl<'b> Optimizer<'b> {
+    fn new(nodes: &'b mut [BinaryNode]) -> Self {
+        let mut parents = vec![ROOT as u32; nodes.len()];
+        for (index, node) in nodes.iter().enumerate() {
+            if let BinaryKind::Inner(children) = node.kind() {
+                children.into_iter().for_each(|child| parents[child] = index as u32);
+            }
+        }
+        Self { nodes, parents, open: BinaryHeap::new() }
+    }
+
+    fn area(&self, index: usize) -> f32 {
+        self.nodes[index].bounds.area()
+    }
+
+    fn parent(&self, index: usize) -> usize {
+        self.parents[index] as usize
+    }
+
+    fn children(&self, index: usize) -> Option<[usize; 2]> {
+        match self.nodes[index].kind() {
+            BinaryKind::Inner(children) => Some(children),
+            BinaryKind::Leaf(_) => None,
+        }
+    }
+
+    /// The other child of a node's parent.
+    fn sibling(&self, index: usize) -> usize {
+        self.children(self.parent(index)).map_or(index, |[a, b]| if a == index { b } else { a })
+    }
+
+    /// The nodes with the largest boxes that may be moved, the largest first.
+    fn largest(&self, count: usize) -> Vec<usize> {
+        // Unused nodes have the root for a parent.
+        let may_move = |&index: &usize| self.parent(index) != ROOT;
+        let by_area = |a: &usize, b: &usize| self.area(*b).total_cmp(&self.area(*a)).then(a.cmp(b));
+        let mut largest: Vec<usize> = (0..self.nodes.len()).filter(may_move).collect();
+        if largest.len() > count {
+            largest.select_nth_unstable_by(count, by_area);
+            largest.truncate(count);
+        }
+        largest.sort_unstable_by(by_area);
+        largest
+    }
+
+    /// Puts a node where boxes grow least; gives its former sibling if it has another one then.
+    fn reinsert(&mut self, index: usize) -> Option<usize> {
+        if self.parent(index) == ROOT || !self.area(index).is_finite() {
+            return None;
+        }
+        let former = self.sibling(index);
+        self.remove(index);
+        let sibling = self.best_sibling(index).unwrap_or(former);
+        self.insert(index, sibling);
+        (sibling != former).then_some(former)
+    }
+
+    /// Takes a node with its parent out.
+    fn remove(&mut self, index: usize) {
+        let (parent, sibling) = (self.parent(index), self.sibling(index));
+        let above = self.parent(parent);
+        self.replace(above, parent, sibling);
+        self.refit(above);
+    }
+
+    /// Puts a node that was taken out, with its parent, beside another.
+    fn insert(&mut self, index: usize, sibling: usize) {
+        let (parent, above) = (self.parent(index), self.parent(sibling));
+        self.replace(above, sibling, parent);
+        self.nodes[parent] = BinaryNode::inner(self.nodes[parent].bounds, [sibling, index]);
+        self.parents[sibling] = parent as u32;
+        self.refit(parent);
+    }
+
+    /// Puts one child in the place of another.
+    fn replace(&mut self, above: usize, old: usize, new: usize) {
+        if let Some(children) = self.children(above) {
+            let children = children.map(|child| if child == old { new } else { child });
+            self.nodes[above] = BinaryNode::inner(self.nodes[above].bounds, children);
+            self.parents[new] = above as u32;
+        }
+    }
+
+    /// Fits the boxes of a node and of those above it.
+    fn refit(&mut self, mut index: usize) {
+        loop {
+            if let Some([a, b]) = self.children(index) {
+                self.nodes[index].bounds = self.nodes[a].bounds.union(&self.nodes[b].bounds);
+            }
+            if index == ROOT {
+                return;
+            }
+            index = self.parent(index);
+        }
+    }
+
+    /// Beside which node boxes grow least; `None` if that is the root.
+    fn best_sibling(&mut self, index: usize) -> Option<usize> {
+        let bounds = self.nodes[index].bounds;
+        let area = bounds.area();
+        let (mut least, mut best) = (f32::INFINITY, ROOT);
+        self.open.clear();
+        self.open.push(Place { growth: 0.0, index: ROOT });
+        for _ in 0..MAX_PLACES {
+            // Below, at least the node's own box is added.
+            let Some(place) = self.open.pop().filter(|place| place.growth + area < least) else { break };
+            let node = &self.nodes[place.index].bounds;
+            let cost = place.growth + node.union(&bounds).area();
+            if cost < least {
+                (least, best) = (cost, place.index);
+            }
+            let growth = cost - node.area();
+            if let Some(children) = self.children(place.index).filter(|_| growth + area < least) {
+                self.open.extend(children.map(|index| Place { growth, index }));
+            }
+        }
+        (best != ROOT).then_some(best)
+    }
+
+    /// Levels of nodes.
+    fn depth(&self) -> usize {
+        let (mut deepest, mut open) = (0, vec![(ROOT, 1)]);
+        while let Some((index, depth)) = open.pop() {
+            deepest = deepest.max(depth);
+            open.extend(self.children(index).into_iter().flatten().map(|child| (child, depth + 1)));
+        }
+        deepest
+    }
+}
