@@ -3,13 +3,17 @@
 
 use arrayvec::ArrayVec;
 
-use super::build::{BLOCK, BLOCK_COST, Binary, BinaryKind};
+use super::build::{BLOCK, BLOCK_COST, Binary, BinaryKind, Reference};
 use super::wide::WIDTH;
+use crate::accel::tree::Items;
 
 /// How the nodes of a binary hierarchy are put together.
 pub(super) struct Collapse<'b> {
     binary: &'b Binary,
+    items: &'b Items<'b>,
     plans: Vec<Plan>,
+    /// How likely rays that enter the box of each node are to hit something, over what that costs.
+    occlusion: Vec<f32>,
 }
 
 /// How the subtree below a node is split into up to `i` children of a wide node, for `i` from 2 to [`WIDTH`]: how many
@@ -36,29 +40,35 @@ struct Costs {
     forests: [f32; WIDTH - 1],
     /// References, if they may share a leaf.
     shared: Option<usize>,
+    /// The area of the surfaces, of both sides.
+    surface: f32,
 }
 
 impl<'b> Collapse<'b> {
-    /// Items that are alone may not share a leaf with others.
-    pub fn new(binary: &'b Binary, is_alone: impl Fn(u32) -> bool) -> Self {
-        let mut collapse = Self { binary, plans: vec![Plan::default(); binary.nodes.len()] };
-        collapse.plan(0, &is_alone);
+    pub fn new(binary: &'b Binary, items: &'b Items<'b>) -> Self {
+        let count = binary.nodes.len();
+        let mut collapse = Self { binary, items, plans: vec![Plan::default(); count], occlusion: vec![0.0; count] };
+        collapse.plan(0);
         collapse
     }
 
-    fn plan(&mut self, index: usize, is_alone: &impl Fn(u32) -> bool) -> Costs {
+    fn plan(&mut self, index: usize) -> Costs {
+        let costs = self.split(index);
+        self.occlusion[index] = costs.surface / costs.forests[0];
+        costs
+    }
+
+    fn split(&mut self, index: usize) -> Costs {
         let node = &self.binary.nodes[index];
         let area = node.bounds.area();
         let children = match node.kind() {
             BinaryKind::Leaf(range) => {
                 self.plans[index] = Plan::LEAF;
-                let references = &self.binary.references[range];
-                let shared = (!references.iter().any(|r| is_alone(r.item))).then_some(references.len());
-                return Costs { forests: [area * BLOCK_COST; WIDTH - 1], shared };
+                return self.leaf(&self.binary.references[range], area * BLOCK_COST);
             }
             BinaryKind::Inner(children) => children,
         };
-        let [first, second] = children.map(|child| self.plan(child, is_alone));
+        let [first, second] = children.map(|child| self.plan(child));
         let mut plan = Plan::default();
         let split = |children: usize| -> (f32, usize) {
             let mut best = (f32::INFINITY, 1);
@@ -85,7 +95,17 @@ impl<'b> Collapse<'b> {
             }
         }
         self.plans[index] = plan;
-        Costs { forests, shared }
+        Costs { forests, shared, surface: first.surface + second.surface }
+    }
+
+    fn leaf(&self, references: &[Reference], cost: f32) -> Costs {
+        let (mut surface, mut is_shared) = (0.0, true);
+        for reference in references {
+            let triangle = self.items.triangle(reference.item as usize);
+            is_shared &= triangle.is_some();
+            surface += triangle.map_or_else(|| reference.bounds.area(), |triangle| 2.0 * triangle.area() as f32);
+        }
+        Costs { forests: [cost; WIDTH - 1], shared: is_shared.then_some(references.len()), surface }
     }
 
     /// Whether a child of a wide node is a leaf.
@@ -93,7 +113,8 @@ impl<'b> Collapse<'b> {
         self.plans[index].0 & Plan::LEAF.0 != 0
     }
 
-    /// The children of the wide node that a subtree becomes.
+    /// The children of the wide node that a subtree becomes, those last that occlude most rays for what they cost
+    /// (Ogaki, Derouet-Jourdan, "An N-ary BVH Child Node Sorting Technique for Occlusion Tests").
     pub fn children(&self, index: usize) -> ArrayVec<usize, WIDTH> {
         let mut children = ArrayVec::new();
         match self.binary.nodes[index].kind() {
@@ -104,6 +125,7 @@ impl<'b> Collapse<'b> {
                 self.collect(second, WIDTH - of_first, &mut children);
             }
         }
+        children.sort_by(|&a, &b| self.occlusion[a].total_cmp(&self.occlusion[b]));
         children
     }
 

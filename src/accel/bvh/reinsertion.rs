@@ -16,12 +16,17 @@ const MOVED: usize = 4_000;
 const MAX_PLACES: usize = 512;
 
 /// Deeper trees are left as they were.
-const MAX_DEPTH: usize = 100;
+const MAX_DEPTH: usize = 64;
 
 const ROOT: usize = 0;
 
-/// Moves nodes while the boxes of the hierarchy shrink.
+/// Moves nodes to where they make the boxes of the hierarchy smaller.
 pub(super) fn optimize(binary: &mut Binary) {
+    optimize_up_to(binary, MAX_DEPTH);
+}
+
+/// As [`optimize`]; a tree with more levels than `max_depth` stays as it was.
+pub(super) fn optimize_up_to(binary: &mut Binary, max_depth: usize) {
     if !binary.nodes[ROOT].bounds.area().is_finite() {
         return;
     }
@@ -32,7 +37,7 @@ pub(super) fn optimize(binary: &mut Binary) {
             moves.extend(optimizer.reinsert(node).map(|sibling| (node, sibling)));
         }
     }
-    if optimizer.depth() > MAX_DEPTH {
+    if optimizer.depth() > max_depth {
         for (node, sibling) in moves.into_iter().rev() {
             optimizer.remove(node);
             optimizer.insert(node, sibling);

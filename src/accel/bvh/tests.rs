@@ -1,4 +1,5 @@
-use super::build::{BLOCK, MAX_LEAF};
+use super::build::{BLOCK, BLOCK_COST, MAX_LEAF};
+use super::collapse::Collapse;
 use super::lanes::{Portable, SimdIsa, WideRay};
 use super::wide::{Block, Entry, Wide, WideNode};
 use super::*;
@@ -295,4 +296,120 @@ fn the_stack_holds_the_deepest_tree() {
     let items = Items::of_shapes(&geometry, &geometry.world);
     let Layout::Wide(Wide { depth, .. }, _) = Bvh::wide(&items, None).0 else { panic!("a wide tree") };
     assert!(depth * (WIDTH - 1) < STACK, "{depth}");
+}
+
+/// Triangles of all sizes and shapes, which binned splits sort badly.
+fn sticks(random: &mut Sequence, count: usize) -> Geometry {
+    let triangles: Vec<_> = (0..count)
+        .map(|_| {
+            let (a, length) = (corner(random), random.next().abs().powi(4));
+            [a, a + length * random.vec(), a + 0.02 * random.vec()]
+        })
+        .collect();
+    mesh(&triangles)
+}
+
+/// The boxes and children of all nodes that are used.
+fn used_nodes(binary: &Binary) -> Vec<(usize, Aabb, BinaryKind)> {
+    let (mut nodes, mut open) = (Vec::new(), vec![0]);
+    while let Some(index) = open.pop() {
+        let mut kind = binary.nodes[index].kind();
+        if let BinaryKind::Inner(children) = &mut kind {
+            children.sort_unstable();
+            open.extend(*children);
+        }
+        nodes.push((index, binary.nodes[index].bounds, kind));
+    }
+    nodes
+}
+
+#[test]
+fn reinsertion_makes_boxes_smaller_and_keeps_all_references() {
+    let geometry = sticks(&mut Sequence(11), many(6_000));
+    let items = Items::of_shapes(&geometry, &geometry.world);
+    let before = Binary::new(references(&items), |_| false);
+    let area = |binary: &Binary| -> f64 { used_nodes(binary).iter().map(|node| f64::from(node.1.area())).sum() };
+
+    let mut after = Binary { nodes: before.nodes.clone(), references: before.references.clone() };
+    reinsertion::optimize(&mut after);
+    if !cfg!(miri) {
+        assert!(area(&after) < 0.97 * area(&before), "{} {}", area(&after), area(&before));
+    }
+    let mut found: Vec<u32> = Vec::new();
+    for (_, bounds, kind) in used_nodes(&after) {
+        let exact = match kind {
+            BinaryKind::Inner(children) => children.map(|child| after.nodes[child].bounds).into_iter().collect(),
+            BinaryKind::Leaf(range) => {
+                found.extend(after.references[range.clone()].iter().map(|r| r.item));
+                after.references[range].iter().map(|r| r.bounds).collect::<Vec<_>>()
+            }
+        };
+        assert_eq!(exact.iter().fold(Aabb::EMPTY, |all, b| all.union(b)), bounds);
+    }
+    found.sort_unstable();
+    assert_eq!(found, (0..items.len() as u32).collect::<Vec<_>>());
+
+    let mut unchanged = Binary { nodes: before.nodes.clone(), references: before.references.clone() };
+    reinsertion::optimize_up_to(&mut unchanged, 1);
+    assert_eq!(used_nodes(&unchanged), used_nodes(&before), "too deep");
+}
+
+/// The least cost of a subtree as at most `count` children of a wide node, and its triangles.
+fn least_cost(binary: &Binary, index: usize, count: usize) -> (f32, usize) {
+    let area = binary.nodes[index].bounds.area();
+    let [first, second] = match binary.nodes[index].kind() {
+        BinaryKind::Leaf(range) => return (area * BLOCK_COST, range.len()),
+        BinaryKind::Inner(children) => children,
+    };
+    let split = |count: usize| {
+        let cost = |of_first| least_cost(binary, first, of_first).0 + least_cost(binary, second, count - of_first).0;
+        (1..count).map(cost).fold(f32::INFINITY, f32::min)
+    };
+    let triangles = least_cost(binary, first, 1).1 + least_cost(binary, second, 1).1;
+    let leaf = if triangles <= BLOCK { area * BLOCK_COST } else { f32::INFINITY };
+    let forests = (2..=count).map(split).fold(f32::INFINITY, f32::min);
+    (forests.min(leaf).min(area + split(WIDTH)), triangles)
+}
+
+/// The cost of the wide node that a subtree becomes, and of all below.
+fn cost(binary: &Binary, collapse: &Collapse<'_>, index: usize) -> f32 {
+    let area = |index: usize| binary.nodes[index].bounds.area();
+    let below = |child: usize| {
+        if collapse.is_leaf(child) { area(child) * BLOCK_COST } else { cost(binary, collapse, child) }
+    };
+    area(index) + collapse.children(index).into_iter().map(below).sum::<f32>()
+}
+
+#[test]
+fn wide_nodes_have_the_children_that_cost_least() {
+    let mut random = Sequence(12);
+    for count in [1, 2, 5, 9, 12, 17] {
+        let geometry = sticks(&mut random, count);
+        let items = Items::of_shapes(&geometry, &geometry.world);
+        let binary = Binary::new(references(&items), |_| false);
+        let collapse = Collapse::new(&binary, &items);
+        let found = cost(&binary, &collapse, 0);
+        let root = binary.nodes[0].bounds.area();
+        let least = match binary.nodes[0].kind() {
+            BinaryKind::Leaf(_) => root + root * BLOCK_COST,
+            BinaryKind::Inner([first, second]) => (1..WIDTH)
+                .map(|k| root + least_cost(&binary, first, k).0 + least_cost(&binary, second, WIDTH - k).0)
+                .fold(f32::INFINITY, f32::min),
+        };
+        assert!((found - least).abs() <= 1e-5 * least, "{count}: {found} {least}");
+    }
+}
+
+#[test]
+fn children_that_occlude_most_for_their_cost_come_last() {
+    // A large triangle fills its box better than a strip of thin ones, which fill more leaves.
+    let large = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    let thin = |i: usize| [4.0, 4.02, 4.0].map(|x| Vec3::new(x, i as f32 * 0.1, 0.0) + Vec3::Y * (x - 4.0) * 5.0);
+    let triangles: Vec<_> = std::iter::once(large).chain((0..11).map(thin)).collect();
+    let geometry = mesh(&triangles);
+    let items = Items::of_shapes(&geometry, &geometry.world);
+    let binary = Binary::new(references(&items), |_| false);
+    let collapse = Collapse::new(&binary, &items);
+    let last = *collapse.children(0).last().unwrap();
+    assert_eq!(collapse.references(last).as_slice(), [0]);
 }

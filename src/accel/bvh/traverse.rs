@@ -27,14 +27,16 @@ pub(super) fn traverse<L: SimdIsa, C: Counter, const ANY: bool>(
         let current = &wide.nodes[node as usize];
         let (mut mask, enter) = lanes.enter(current, &ray, t_min, query.t_max());
 
-        // The nearest child is next; the others wait, the farther the longer.
+        // The nearest child is next; the others wait, the farther the longer. Of any hits, the last.
         let first = stack.len();
         while mask != 0 {
             let slot = mask.trailing_zeros() as usize;
             mask &= mask - 1;
             stack.push((enter[slot], current.children[slot]));
         }
-        sort_descending(&mut stack[first..]);
+        if !ANY {
+            sort_descending(&mut stack[first..]);
+        }
 
         node = loop {
             let Some((near, child)) = stack.pop() else { return };

@@ -177,7 +177,7 @@ pub(super) struct Wide {
 impl Wide {
     /// From a binary hierarchy.
     pub fn new(binary: &Binary, items: &Items<'_>) -> Self {
-        let collapse = Collapse::new(binary, |item| items.triangle(item as usize).is_none());
+        let collapse = Collapse::new(binary, items);
         let mut wide =
             Self { nodes: Vec::new(), blocks: Vec::new(), items: Vec::new(), bounds: binary.nodes[0].bounds, depth: 0 };
         wide.nodes.reserve(binary.references.len() / 16 + 1);
