@@ -8,6 +8,7 @@ use std::cell::RefCell;
 use std::hint::select_unpredictable;
 
 use super::Bvh;
+use super::any_hit_order::{AnyHitOrder, MeasuredOrders};
 use super::lanes::{SimdIsa, WideRay};
 use super::wide::{Block, Child, ChildKind, Entry, STACK, WIDTH, Wide, WideNode};
 use crate::accel::inspect::ItemKind;
@@ -42,6 +43,7 @@ pub(super) struct Scratch {
     /// The node or leaf that each ray visits next.
     next: [Child; BATCH],
     stacks: [Stack; SLOTS],
+    any_hit_orders: MeasuredOrders,
 }
 
 thread_local! {
@@ -64,6 +66,7 @@ impl Default for Scratch {
             keys: [0; BATCH],
             next: [Child::ROOT; BATCH],
             stacks: [Stack { entries: [Entry::NONE; STACK + WIDTH], len: 0 }; SLOTS],
+            any_hit_orders: MeasuredOrders::default(),
         }
     }
 }
@@ -147,7 +150,10 @@ pub(super) fn trace<L: SimdIsa, const ANY: bool>(
     for lane in 0..count {
         answers.set(lane, None);
     }
-    let mut tracer = Tracer { wide, batch, scratch, answers, places: Places::default(), ended: u32::MAX };
+    let any_hit_order = if ANY { scratch.any_hit_orders.next() } else { AnyHitOrder::Distance };
+    let mut tracer =
+        Tracer { wide, batch, scratch, answers, any_hit_order, places: Places::default(), ended: u32::MAX };
+    let mut steps = 0;
     let mut lane_of = [0; SLOTS];
     let mut rest = 0..count;
     loop {
@@ -159,14 +165,18 @@ pub(super) fn trace<L: SimdIsa, const ANY: bool>(
         }
         let now = std::mem::take(&mut tracer.places);
         if now.nodes | now.leaves == 0 {
-            return;
+            break;
         }
+        steps += now.nodes.count_ones() + now.leaves.count_ones();
         for slot in set_bits(now.nodes) {
             tracer.open::<L, ANY>(lanes, slot, lane_of[slot] % BATCH);
         }
         for slot in set_bits(now.leaves) {
             tracer.test_leaf::<L, ANY>(lanes, slot, lane_of[slot] % BATCH);
         }
+    }
+    if ANY {
+        scratch.any_hit_orders.add(any_hit_order, count, steps);
     }
 }
 
@@ -175,6 +185,7 @@ struct Tracer<'t, 'r, 'a, A> {
     batch: &'t Batch<'r, 'a>,
     scratch: &'t mut Scratch,
     answers: &'t mut A,
+    any_hit_order: AnyHitOrder,
     places: Places,
     /// Slots whose rays are answered.
     ended: u32,
@@ -190,7 +201,11 @@ impl<A: Answers> Tracer<'_, '_, '_, A> {
         // Not a negative zero: bits of distances are compared.
         let t_min = self.batch.rays.t_min[lane] + 0.0;
         let (_, enter) = lanes.enter(node, &ray, t_min, scratch.t_max[lane]);
-        let order = if ANY { WideNode::BY_SLOT } else { node.orders[scratch.slabs.negative[lane] as usize % 8] };
+        let order = if ANY && self.any_hit_order == AnyHitOrder::Occlusion {
+            WideNode::BY_SLOT
+        } else {
+            node.orders[scratch.slabs.negative[lane] as usize % 8]
+        };
         let (entries, count) = lanes.ordered(enter, order, &node.children);
         scratch.stacks[slot].push(entries, count);
         self.advance(slot, lane);

@@ -1,5 +1,6 @@
 //! A bounding volume hierarchy: built by the surface area heuristic, traced eight boxes and four triangles at a time.
 
+mod any_hit_order;
 mod batch;
 mod binary;
 mod build;
