@@ -76,7 +76,6 @@ impl BinaryNode {
 
 /// A binary hierarchy; the root is the first node.
 pub(in crate::accel) struct Binary {
-    /// A node for `n` references is followed by the room that its children may need, so parts of it are unused.
     pub nodes: Vec<BinaryNode>,
     pub references: Vec<Reference>,
 }
@@ -96,8 +95,25 @@ impl Binary {
     fn from_depth(mut references: Vec<Reference>, is_alone: impl Fn(u32) -> bool + Sync, depth: u32) -> Self {
         let mut nodes = vec![BinaryNode::UNUSED; 2 * references.len() - 1];
         Builder { is_alone }.build(&mut nodes, &mut references, 0, 0, depth);
-        Self { nodes, references }
+        Self { nodes: without_unused(&nodes), references }
     }
+}
+
+/// The nodes in use: each is followed by the room that as many as it has references may need.
+fn without_unused(nodes: &[BinaryNode]) -> Vec<BinaryNode> {
+    let is_used = |node: &&BinaryNode| node.kind() != BinaryNode::UNUSED.kind();
+    let mut places = Vec::with_capacity(nodes.len());
+    let mut count = 0;
+    for node in nodes {
+        places.push(count);
+        count += usize::from(is_used(&node)) as u32;
+    }
+    let mut used = Vec::with_capacity(count as usize);
+    used.extend(nodes.iter().filter(is_used).map(|node| match node.kind() {
+        BinaryKind::Inner(children) => BinaryNode::inner(node.bounds, children.map(|child| places[child] as usize)),
+        BinaryKind::Leaf(_) => *node,
+    }));
+    used
 }
 
 struct Builder<F> {

@@ -12,6 +12,9 @@ const PASSES: usize = 5;
 /// How many of them.
 const MOVED: usize = 4_000;
 
+/// They are among so many that were the largest before.
+const CANDIDATES: usize = 4 * MOVED;
+
 /// Places looked at for a node; mostly 30 to 70 are.
 const MAX_PLACES: usize = 512;
 
@@ -32,8 +35,9 @@ pub(super) fn optimize_up_to(binary: &mut Binary, max_depth: usize) {
     }
     let mut optimizer = Optimizer::new(&mut binary.nodes);
     let mut moves = Vec::new();
+    let candidates = optimizer.largest(0..optimizer.nodes.len(), CANDIDATES);
     for _ in 0..PASSES {
-        for node in optimizer.largest(MOVED) {
+        for node in optimizer.largest(candidates.iter().copied(), MOVED) {
             moves.extend(optimizer.reinsert(node).map(|sibling| (node, sibling)));
         }
     }
@@ -111,12 +115,11 @@ impl<'b> Optimizer<'b> {
         self.children(self.parent(index)).map_or(index, |[a, b]| if a == index { b } else { a })
     }
 
-    /// The nodes with the largest boxes that may be moved, the largest first.
-    fn largest(&self, count: usize) -> Vec<usize> {
-        // Unused nodes have the root for a parent.
+    /// Of the nodes that may be moved, those with the largest boxes, the largest first.
+    fn largest(&self, nodes: impl Iterator<Item = usize>, count: usize) -> Vec<usize> {
         let may_move = |&index: &usize| self.parent(index) != ROOT;
         let by_area = |a: &usize, b: &usize| self.area(*b).total_cmp(&self.area(*a)).then(a.cmp(b));
-        let mut largest: Vec<usize> = (0..self.nodes.len()).filter(may_move).collect();
+        let mut largest: Vec<usize> = nodes.filter(may_move).collect();
         if largest.len() > count {
             largest.select_nth_unstable_by(count, by_area);
             largest.truncate(count);
