@@ -24,7 +24,8 @@ const MAX_WALL_TRIANGLES: usize = 80;
 /// The least area of the box around such a mesh, in areas of the box around the world.
 const MIN_WALL_AREA: f32 = 0.02;
 
-/// With so many triangles, the build of the BVH takes twice the memory of Embree's (`docs/accelerators.md`).
+/// With so many triangles, the build of the BVH takes three times as long as Embree's and 1.8 times the memory
+/// (`docs/accelerators.md`).
 const MAX_TRIANGLES: usize = 2_000_000;
 
 /// What traces what is not in packets.
