@@ -1,8 +1,8 @@
-//! In which order any-hit rays visit children: by what they occlude for their cost, or near children first. Which is
-//! faster depends on the scene, so that batches measure both. Answers are the same.
+//! The order in which any-hit rays visit children: by probability of occlusion over cost, or near to far. Which is
+//! faster depends on the scene, so both are measured. Answers are the same.
 
-/// Of so many batches, one is traced in the order that was slower.
-const EXPLORED: u32 = 16;
+/// One of so many batches is traced in the order that takes more steps, to measure it again.
+const PERIOD: u32 = 16;
 
 /// Smaller batches are not measured.
 const MIN_RAYS: usize = 16;
@@ -10,16 +10,16 @@ const MIN_RAYS: usize = 16;
 /// An order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum AnyHitOrder {
-    /// What occludes most rays for its cost comes first.
+    /// By probability of occlusion over cost, highest first.
     Occlusion,
-    /// What is entered first, as closest hits.
+    /// Near to far, as for closest hits.
     Distance,
 }
 
-/// The steps that both orders take.
+/// How many nodes and leaves rays visit in both orders.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct MeasuredOrders {
-    /// Averages of the steps of a ray.
+    /// Moving averages of nodes and leaves per ray.
     steps: [Option<f32>; 2],
     batches: u32,
 }
@@ -32,11 +32,11 @@ impl MeasuredOrders {
             [Some(occlusion), Some(distance)] => distance < occlusion,
             [occlusion, _] => occlusion.is_some(),
         };
-        let explores = self.batches.is_multiple_of(EXPLORED);
+        let explores = self.batches.is_multiple_of(PERIOD);
         if is_distance_faster != explores { AnyHitOrder::Distance } else { AnyHitOrder::Occlusion }
     }
 
-    /// Adds a batch.
+    /// Adds the nodes and leaves that a batch visited.
     pub fn add(&mut self, order: AnyHitOrder, rays: usize, steps: u32) {
         if rays >= MIN_RAYS {
             let steps = steps as f32 / rays as f32;

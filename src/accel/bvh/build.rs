@@ -99,20 +99,24 @@ impl Binary {
     }
 }
 
-/// The nodes in use: each is followed by the room that as many as it has references may need.
+/// Without the nodes that the builder left free: it sets as many aside as the references of a subtree may need.
 fn without_unused(nodes: &[BinaryNode]) -> Vec<BinaryNode> {
-    let is_used = |node: &&BinaryNode| node.kind() != BinaryNode::UNUSED.kind();
-    let mut places = Vec::with_capacity(nodes.len());
+    let is_used = |node: &BinaryNode| node.kind() != BinaryNode::UNUSED.kind();
     let mut count = 0;
+    let mut indices = Vec::with_capacity(nodes.len());
     for node in nodes {
-        places.push(count);
-        count += usize::from(is_used(&node)) as u32;
+        indices.push(count);
+        count += u32::from(is_used(node));
     }
     let mut used = Vec::with_capacity(count as usize);
-    used.extend(nodes.iter().filter(is_used).map(|node| match node.kind() {
-        BinaryKind::Inner(children) => BinaryNode::inner(node.bounds, children.map(|child| places[child] as usize)),
-        BinaryKind::Leaf(_) => *node,
-    }));
+    for node in nodes.iter().filter(|node| is_used(node)) {
+        used.push(match node.kind() {
+            BinaryKind::Inner(children) => {
+                BinaryNode::inner(node.bounds, children.map(|child| indices[child] as usize))
+            }
+            BinaryKind::Leaf(_) => *node,
+        });
+    }
     used
 }
 

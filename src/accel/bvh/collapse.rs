@@ -3,16 +3,19 @@
 
 use arrayvec::ArrayVec;
 
-use super::build::{BLOCK, BLOCK_COST, Binary, BinaryKind, Reference};
+use super::build::{BLOCK, BLOCK_COST, Binary, BinaryKind, MAX_LEAF, Reference};
 use super::wide::WIDTH;
 use crate::accel::tree::Items;
+
+// A leaf fills one block at most.
+const _: () = assert!(MAX_LEAF <= BLOCK);
 
 /// How the nodes of a binary hierarchy are put together.
 pub(super) struct Collapse<'b> {
     binary: &'b Binary,
     items: &'b Items<'b>,
     plans: Vec<Plan>,
-    /// How likely rays that enter the box of each node are to hit something, over what that costs.
+    /// How likely rays that enter the box of each node are to be occluded, over the cost of the test.
     occlusion: Vec<f32>,
 }
 
@@ -53,12 +56,12 @@ impl<'b> Collapse<'b> {
     }
 
     fn plan(&mut self, index: usize) -> Costs {
-        let costs = self.split(index);
+        let costs = self.costs(index);
         self.occlusion[index] = costs.surface / costs.forests[0];
         costs
     }
 
-    fn split(&mut self, index: usize) -> Costs {
+    fn costs(&mut self, index: usize) -> Costs {
         let node = &self.binary.nodes[index];
         let area = node.bounds.area();
         let children = match node.kind() {

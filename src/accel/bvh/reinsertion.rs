@@ -1,29 +1,30 @@
-//! Nodes of a binary hierarchy are taken out and put back where boxes grow least (Bittner, Hapala, Havran, "Fast
-//! Insertion-Based Optimization of Bounding Volume Hierarchies"; nodes in the order of their areas).
+//! Optimization by reinsertion: nodes of a binary hierarchy are removed and inserted where the surface area grows least
+//! (Bittner, Hapala, Havran, "Fast Insertion-Based Optimization of Bounding Volume Hierarchies"; here in the order of
+//! their areas).
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use super::build::{Binary, BinaryKind, BinaryNode};
 
-/// How often the largest nodes are put elsewhere.
+/// How often the largest nodes are reinserted.
 const PASSES: usize = 5;
 
-/// How many of them.
-const MOVED: usize = 4_000;
+/// How many nodes a pass reinserts.
+const REINSERTED: usize = 4_000;
 
-/// They are among so many that were the largest before.
-const CANDIDATES: usize = 4 * MOVED;
+/// The largest nodes of the tree as it is built, from which each pass takes its own.
+const CANDIDATES: usize = 4 * REINSERTED;
 
-/// Places looked at for a node; mostly 30 to 70 are.
-const MAX_PLACES: usize = 512;
+/// The most positions that are tried for a node; 30 to 40 are on average.
+const MAX_POSITIONS: usize = 512;
 
 /// Deeper trees are left as they were.
 const MAX_DEPTH: usize = 64;
 
 const ROOT: usize = 0;
 
-/// Moves nodes to where they make the boxes of the hierarchy smaller.
+/// Reinserts the largest nodes.
 pub(super) fn optimize(binary: &mut Binary) {
     optimize_up_to(binary, MAX_DEPTH);
 }
@@ -37,7 +38,7 @@ pub(super) fn optimize_up_to(binary: &mut Binary, max_depth: usize) {
     let mut moves = Vec::new();
     let candidates = optimizer.largest(0..optimizer.nodes.len(), CANDIDATES);
     for _ in 0..PASSES {
-        for node in optimizer.largest(candidates.iter().copied(), MOVED) {
+        for node in optimizer.largest(candidates.iter().copied(), REINSERTED) {
             moves.extend(optimizer.reinsert(node).map(|sibling| (node, sibling)));
         }
     }
@@ -53,36 +54,36 @@ struct Optimizer<'b> {
     nodes: &'b mut [BinaryNode],
     /// Of each node but the root.
     parents: Vec<u32>,
-    open: BinaryHeap<Place>,
+    queue: BinaryHeap<Position>,
 }
 
-/// A subtree to put a node into.
-struct Place {
-    /// How much the boxes above it grow.
+/// A subtree that a node may be inserted into.
+struct Position {
+    /// How much the areas of the boxes above it grow.
     growth: f32,
     index: usize,
 }
 
-/// The largest is the place with the least growth.
-impl Ord for Place {
+/// The largest is the position with the least growth.
+impl Ord for Position {
     fn cmp(&self, other: &Self) -> Ordering {
         other.growth.total_cmp(&self.growth).then(other.index.cmp(&self.index))
     }
 }
 
-impl PartialOrd for Place {
+impl PartialOrd for Position {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl PartialEq for Place {
+impl PartialEq for Position {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other).is_eq()
     }
 }
 
-impl Eq for Place {}
+impl Eq for Position {}
 
 impl<'b> Optimizer<'b> {
     fn new(nodes: &'b mut [BinaryNode]) -> Self {
@@ -92,7 +93,7 @@ impl<'b> Optimizer<'b> {
                 children.into_iter().for_each(|child| parents[child] = index as u32);
             }
         }
-        Self { nodes, parents, open: BinaryHeap::new() }
+        Self { nodes, parents, queue: BinaryHeap::new() }
     }
 
     fn area(&self, index: usize) -> f32 {
@@ -128,7 +129,7 @@ impl<'b> Optimizer<'b> {
         largest
     }
 
-    /// Puts a node where boxes grow least; gives its former sibling if it has another one then.
+    /// Reinserts a node; gives its former sibling if it has another one then.
     fn reinsert(&mut self, index: usize) -> Option<usize> {
         if self.parent(index) == ROOT || !self.area(index).is_finite() {
             return None;
@@ -140,7 +141,7 @@ impl<'b> Optimizer<'b> {
         (sibling != former).then_some(former)
     }
 
-    /// Takes a node with its parent out.
+    /// Removes a node and its parent.
     fn remove(&mut self, index: usize) {
         let (parent, sibling) = (self.parent(index), self.sibling(index));
         let above = self.parent(parent);
@@ -148,7 +149,7 @@ impl<'b> Optimizer<'b> {
         self.refit(above);
     }
 
-    /// Puts a node that was taken out, with its parent, beside another.
+    /// Inserts a node that was removed, with its parent, beside another.
     fn insert(&mut self, index: usize, sibling: usize) {
         let (parent, above) = (self.parent(index), self.parent(sibling));
         self.replace(above, sibling, parent);
@@ -157,7 +158,7 @@ impl<'b> Optimizer<'b> {
         self.refit(parent);
     }
 
-    /// Puts one child in the place of another.
+    /// Replaces one child by another.
     fn replace(&mut self, above: usize, old: usize, new: usize) {
         if let Some(children) = self.children(above) {
             let children = children.map(|child| if child == old { new } else { child });
@@ -166,7 +167,7 @@ impl<'b> Optimizer<'b> {
         }
     }
 
-    /// Fits the boxes of a node and of those above it.
+    /// Refits the boxes of a node and of its ancestors.
     fn refit(&mut self, mut index: usize) {
         loop {
             if let Some([a, b]) = self.children(index) {
@@ -179,24 +180,24 @@ impl<'b> Optimizer<'b> {
         }
     }
 
-    /// Beside which node boxes grow least; `None` if that is the root.
+    /// The node beside which the surface area grows least; `None` if that is the root.
     fn best_sibling(&mut self, index: usize) -> Option<usize> {
         let bounds = self.nodes[index].bounds;
         let area = bounds.area();
         let (mut least, mut best) = (f32::INFINITY, ROOT);
-        self.open.clear();
-        self.open.push(Place { growth: 0.0, index: ROOT });
-        for _ in 0..MAX_PLACES {
+        self.queue.clear();
+        self.queue.push(Position { growth: 0.0, index: ROOT });
+        for _ in 0..MAX_POSITIONS {
             // Below, at least the node's own box is added.
-            let Some(place) = self.open.pop().filter(|place| place.growth + area < least) else { break };
-            let node = &self.nodes[place.index].bounds;
-            let cost = place.growth + node.union(&bounds).area();
+            let Some(position) = self.queue.pop().filter(|position| position.growth + area < least) else { break };
+            let node = &self.nodes[position.index].bounds;
+            let cost = position.growth + node.union(&bounds).area();
             if cost < least {
-                (least, best) = (cost, place.index);
+                (least, best) = (cost, position.index);
             }
             let growth = cost - node.area();
-            if let Some(children) = self.children(place.index).filter(|_| growth + area < least) {
-                self.open.extend(children.map(|index| Place { growth, index }));
+            if let Some(children) = self.children(position.index).filter(|_| growth + area < least) {
+                self.queue.extend(children.map(|index| Position { growth, index }));
             }
         }
         (best != ROOT).then_some(best)
