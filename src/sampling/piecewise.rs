@@ -335,18 +335,6 @@ impl Piecewise2d {
         self.blocks[y / SIDE * self.columns.len + x / SIDE].pmf(x % SIDE, y % SIDE, self.block_pmf(x, y))
     }
 
-    /// The probabilities of the first `count` cells, as [`pmf`](Self::pmf).
-    pub fn pmfs<const N: usize>(&self, x: &[u32; N], y: &[u32; N], count: usize, pmfs: &mut [f32; N]) {
-        let mut blocks = [Block::default(); N];
-        for ((block, x), y) in blocks.iter_mut().zip(x).zip(y).take(count) {
-            *block = self.blocks[*y as usize / SIDE * self.columns.len + *x as usize / SIDE];
-        }
-        for (((pmf, block), &x), &y) in pmfs.iter_mut().zip(&blocks).zip(x).zip(y).take(count) {
-            let (x, y) = (x as usize, y as usize);
-            *pmf = block.pmf(x % SIDE, y % SIDE, self.block_pmf(x, y));
-        }
-    }
-
     /// The probability of the block of a cell.
     #[inline]
     fn block_pmf(&self, x: usize, y: usize) -> f64 {

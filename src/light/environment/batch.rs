@@ -1,11 +1,11 @@
 //! Many directions of an image at once: what is computed is computed in rows, and what waits for memory is nothing but
 //! copies, which do not wait for one another.
 
-use super::{EnvironmentMap, Location};
+use super::{CellDensity, EnvironmentMap, Location};
 use crate::color::{Rgb, RgbRows};
 use crate::light::{InfiniteLightEvalRows, MisCompensation};
 use crate::math::Vec3;
-use crate::math::rows::{BATCH, Element, Vec3Rows, soa, whole_vectors};
+use crate::math::rows::{BATCH, Element, Row, Vec3Rows, soa, whole_vectors};
 use crate::math::vectorize::vectorize;
 use crate::sampling::PiecewiseCell;
 
@@ -88,6 +88,14 @@ impl LocationRows {
     }
 }
 
+impl CornerRows {
+    /// As [`EnvironmentMap::corners`].
+    #[inline(always)]
+    fn of_cell(&self, i: usize) -> [Rgb; 4] {
+        [self.upper_left.get(i), self.upper_right.get(i), self.lower_left.get(i), self.lower_right.get(i)]
+    }
+}
+
 impl EnvironmentScratch {
     /// [`Environment::eval`](super::Environment::eval) for the first `count` unit directions, at most [`BATCH`]; the
     /// densities only if `compensation` is given.
@@ -105,12 +113,7 @@ impl EnvironmentScratch {
         let Some(compensation) = compensation else { return };
         match map.density(compensation) {
             None => evals.pdf = [0.0; BATCH],
-            Some(density) => {
-                density.pmfs(&locations.x, &locations.y, count, &mut evals.pdf);
-                for (pdf, &y) in evals.pdf.iter_mut().zip(&locations.y).take(count) {
-                    *pdf *= map.inverse_solid_angles[y as usize];
-                }
-            }
+            Some(density) => vectorize!(find_pdfs(density, corners, &mut evals.pdf, count)),
         }
     }
 
@@ -126,7 +129,7 @@ impl EnvironmentScratch {
     ) -> bool {
         let Some(density) = map.density(compensation) else { return false };
         let Self { locations, corners, cells, chosen } = self;
-        density.sample_cells(&u[..count], chosen);
+        density.cells.sample_cells(&u[..count], chosen);
         for (i, cell) in chosen.iter().enumerate().take(count) {
             (cells.x[i], cells.y[i], cells.pmf[i]) = (cell.x as u32, cell.y as u32, cell.pmf);
             [cells.u[i], cells.v[i]] = cell.within;
@@ -187,8 +190,13 @@ fn find_directions(
 #[inline(always)]
 fn interpolate_rows(locations: &LocationRows, corners: &CornerRows, radiance: &mut RgbRows, count: usize) {
     for i in 0..whole_vectors(count) {
-        let upper = [corners.upper_left.get(i), corners.upper_right.get(i)];
-        let lower = [corners.lower_left.get(i), corners.lower_right.get(i)];
-        radiance.set(i, super::interpolate([upper, lower], locations.get(i).within));
+        radiance.set(i, super::interpolate(corners.of_cell(i), locations.get(i).within));
+    }
+}
+
+#[inline(always)]
+fn find_pdfs(density: &CellDensity, corners: &CornerRows, pdfs: &mut Row, count: usize) {
+    for i in 0..whole_vectors(count) {
+        pdfs[i] = density.pdf(corners.of_cell(i));
     }
 }

@@ -43,7 +43,7 @@ impl Environment {
             Self::Constant(_) if compensation == MisCompensation::On => return None,
             Self::Constant(radiance) => (uniform_sphere(u), *radiance, UNIFORM_SPHERE_PDF),
             Self::Map(map) => {
-                let chosen = map.choose(map.density(compensation)?, u);
+                let chosen = map.choose(&map.density(compensation)?.cells, u);
                 (chosen.wi, map.lookup(chosen.at), chosen.pdf)
             }
         };
@@ -60,7 +60,9 @@ impl Environment {
             },
             Self::Map(map) => {
                 let at = map.locate(wi);
-                InfiniteLightEval { radiance: map.lookup(at), pdf: map.pdf(at, compensation) }
+                let corners = map.corners(at.x as usize, at.y as usize);
+                let pdf = map.density(compensation).map_or(0.0, |density| density.pdf(corners));
+                InfiniteLightEval { radiance: interpolate(corners, at.within), pdf }
             }
         }
     }
@@ -131,11 +133,43 @@ pub struct EnvironmentMap {
     /// How directions are chosen, by [`MisCompensation`]; built on first use. `None` if the image is black. Column i
     /// lies between the centres of texels i and i + 1; row j between those of rows j - 1 and j, the first and the last
     /// between the outermost centres and the poles.
-    densities: [OnceLock<Option<Piecewise2d>>; 2],
+    densities: [OnceLock<Option<CellDensity>>; 2],
     /// Cosine of the polar angle at the upper limit of each row of the density, and at the lower pole.
     cosines: Vec<f64>,
     /// 1 over the solid angle of the cells of each row.
     inverse_solid_angles: Vec<f32>,
+}
+
+/// How cells are chosen.
+#[derive(Clone, Debug)]
+struct CellDensity {
+    cells: Piecewise2d,
+    /// What the luminance is multiplied by, so that neither the brightest nor faint images leave the range of `f32`.
+    scale: f32,
+    /// The scaled luminance that is found without sampling the image, and the least of a cell that is chosen.
+    found_without: f32,
+    limit: f32,
+    /// 1 over the integral of the scaled luminance that is to be found.
+    inverse_fluence: f32,
+}
+
+impl CellDensity {
+    /// Density per solid angle of a cell with these texels at its corners. [`Piecewise2d::pmf`] is the same but for
+    /// rounding, and waits for more memory.
+    #[inline(always)]
+    fn pdf(&self, corners: [Rgb; 4]) -> f32 {
+        let quarter = 0.25 * self.scale;
+        let [a, b, c, d] = corners.map(|t| brightness(t * quarter));
+        let mean = (a + b) + (c + d);
+        if mean > self.limit { (mean - self.found_without) * self.inverse_fluence } else { 0.0 }
+    }
+}
+
+/// What is to be found in each cell, row by row: luminance times solid angle.
+struct CellWeights {
+    weights: Vec<f64>,
+    /// The luminance that is found without sampling the image.
+    found_without: f64,
 }
 
 /// A direction in the image: a cell of the density and where between its corners, linear in azimuth and polar angle.
@@ -191,13 +225,10 @@ impl EnvironmentMap {
         Ok(Self { width, height, texels, axes, densities: Default::default(), cosines, inverse_solid_angles })
     }
 
-    /// What is to be found in each cell: the mean of the bilinear luminance (its corners' mean) times the cell's solid
-    /// angle; row by row.
-    fn weights(&self, compensation: MisCompensation) -> Vec<f64> {
-        // Negative channels (of colours out of gamut) must not cancel others: such a texel is not black.
-        let brightness = |t: Rgb| f64::from(t.map(f32::abs).luminance());
+    /// Of each cell, the mean of the bilinear luminance (its corners' mean) times the solid angle.
+    fn weights(&self, compensation: MisCompensation) -> CellWeights {
         let row = |y: usize| -> Vec<f64> {
-            self.texels[y * self.width..(y + 1) * self.width].iter().map(|&t| brightness(t)).collect()
+            self.texels[y * self.width..(y + 1) * self.width].iter().map(|&t| brightness(t).into()).collect()
         };
         let solid_angle = |y: usize| (self.cosines[y] - self.cosines[y + 1]) * 2.0 * PI / self.width as f64;
         let mut weights = Vec::with_capacity(self.width * (self.height + 1));
@@ -222,23 +253,29 @@ impl EnvironmentMap {
                 *weight = left * solid_angle(y);
             }
         }
-        weights
+        CellWeights { weights, found_without }
     }
 
-    fn density(&self, compensation: MisCompensation) -> Option<&Piecewise2d> {
+    fn density(&self, compensation: MisCompensation) -> Option<&CellDensity> {
         let make = || {
-            let weights = self.weights(compensation);
+            let CellWeights { weights, found_without } = self.weights(compensation);
             // Scaled so that neither the brightest nor faint ones leave the range of f32.
             let largest = weights.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
             let scaled = |&w: &f64| if w > 0.0 { ((w / largest) as f32).max(f32::MIN_POSITIVE) } else { 0.0 };
-            Piecewise2d::new(self.width, self.height + 1, &weights.iter().map(scaled).collect::<Vec<_>>())
+            let scaled: Vec<_> = weights.iter().map(scaled).collect();
+            let cells = Piecewise2d::new(self.width, self.height + 1, &scaled)?;
+            let brightest = self.texels.iter().fold(f32::MIN_POSITIVE, |most, &t| most.max(brightness(t)));
+            let scale = 2f32.powi(-brightest.log2().floor() as i32);
+            let [found_without, limit] = [1.0, 1.0 + EVEN].map(|by| (found_without * by * f64::from(scale)) as f32);
+            let inverse_fluence = (1.0 / (weights.iter().sum::<f64>() * f64::from(scale))) as f32;
+            Some(CellDensity { cells, scale, found_without, limit, inverse_fluence })
         };
         self.densities[compensation as usize].get_or_init(make).as_ref()
     }
 
     /// Integral of the luminance that is to be found over all directions.
     fn fluence(&self, compensation: MisCompensation) -> f64 {
-        self.weights(compensation).iter().sum()
+        self.weights(compensation).weights.iter().sum()
     }
 
     /// The texels at the corners of a cell: upper left, upper right, lower left, lower right.
@@ -252,8 +289,7 @@ impl EnvironmentMap {
 
     #[inline]
     fn lookup(&self, at: Location) -> Rgb {
-        let [a, b, c, d] = self.corners(at.x as usize, at.y as usize);
-        interpolate([[a, b], [c, d]], at.within)
+        interpolate(self.corners(at.x as usize, at.y as usize), at.within)
     }
 
     /// Where in the image the unit direction `wi` looks.
@@ -270,13 +306,6 @@ impl EnvironmentMap {
         let y = theta * FRAC_1_PI * height as f32 + 0.5;
         let row = (y as i32).min(height);
         Location { x: column as u32, y: row as u32, within: [(x - column as f32).min(1.0), (y - row as f32).min(1.0)] }
-    }
-
-    /// Density per solid angle, constant in each cell.
-    #[inline]
-    fn pdf(&self, at: Location, compensation: MisCompensation) -> f32 {
-        let (x, y) = (at.x as usize, at.y as usize);
-        self.density(compensation).map_or(0.0, |density| density.pmf(x, y) * self.inverse_solid_angles[y])
     }
 
     /// A direction chosen by a density.
@@ -306,9 +335,16 @@ impl EnvironmentMap {
     }
 }
 
-/// The bilinear interpolation of two rows of two texels.
+/// The luminance of a texel. Negative channels (of colours out of gamut) must not cancel others: such a texel is not
+/// black.
 #[inline(always)]
-fn interpolate([[a, b], [c, d]]: [[Rgb; 2]; 2], [s, t]: [f32; 2]) -> Rgb {
+fn brightness(texel: Rgb) -> f32 {
+    texel.map(f32::abs).luminance()
+}
+
+/// The bilinear interpolation of the texels at the corners of a cell, as [`EnvironmentMap::corners`] has them.
+#[inline(always)]
+fn interpolate([a, b, c, d]: [Rgb; 4], [s, t]: [f32; 2]) -> Rgb {
     (a * (1.0 - s) + b * s) * (1.0 - t) + (c * (1.0 - s) + d * s) * t
 }
 

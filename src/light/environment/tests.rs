@@ -8,17 +8,22 @@ use crate::light::{DirectionalLight, InfiniteLightEvalRows, Light, LightSet};
 use crate::math::rows::{BATCH, Vec3Rows};
 use crate::math::{DVec3, Rng};
 
-fn map(width: usize, height: usize, texel: impl Fn(usize, usize) -> f32) -> EnvironmentMap {
+fn map(width: usize, height: usize, texel: impl FnMut(usize, usize) -> f32) -> EnvironmentMap {
     turned(width, height, DMat3::IDENTITY, texel)
 }
 
-fn turned(width: usize, height: usize, rotation: DMat3, texel: impl Fn(usize, usize) -> f32) -> EnvironmentMap {
+fn turned(width: usize, height: usize, rotation: DMat3, mut texel: impl FnMut(usize, usize) -> f32) -> EnvironmentMap {
     let pixels = (0..width * height).map(|i| Rgb::splat(texel(i % width, i / width))).collect();
     EnvironmentMap::new(width, height, pixels, rotation, 1.0).unwrap()
 }
 
 fn environment(map: EnvironmentMap) -> Environment {
     Environment::Map(Box::new(map))
+}
+
+/// The density per solid angle, without compensation.
+fn pdf_at(map: &EnvironmentMap, at: Location) -> f32 {
+    map.density(MisCompensation::Off).unwrap().pdf(map.corners(at.x as usize, at.y as usize))
 }
 
 /// The direction at polar angle `theta` from +Y and at `u` of the image's width.
@@ -49,22 +54,34 @@ fn the_density_is_finite_at_the_poles_and_at_texel_corners() {
     let map = map(16, 8, |x, y| (x + y) as f32);
     for d in [Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z, Vec3::X, Vec3::new(1e-20, 1.0, 0.0), Vec3::new(0.0, -1.0, -1e-30)] {
         let at = map.locate(d);
-        assert!(
-            map.pdf(at, MisCompensation::Off).is_finite()
-                && map.pdf(at, MisCompensation::Off) > 0.0
-                && map.lookup(at).is_finite(),
-            "{d}"
-        );
+        assert!(pdf_at(&map, at).is_finite() && pdf_at(&map, at) > 0.0 && map.lookup(at).is_finite(), "{d}");
     }
     for y in 0..=8 {
         for x in 0..=16 {
             let d = direction(f64::from(x) / 16.0, PI * f64::from(y) / 8.0);
-            assert!(map.pdf(map.locate(d), MisCompensation::Off).is_finite());
+            assert!(pdf_at(&map, map.locate(d)).is_finite());
         }
     }
     for u in [[0.0, 0.0], [0.0, 0.999_999_94], [0.999_999_94, 0.0], [0.999_999_94; 2]] {
-        let s = map.choose(map.density(MisCompensation::Off).unwrap(), u);
+        let s = map.choose(&map.density(MisCompensation::Off).unwrap().cells, u);
         assert!(s.wi.is_finite() && s.pdf.is_finite() && s.pdf > 0.0);
+    }
+}
+
+/// What the texels say against the tables that cells are chosen with, for images from faint to bright.
+#[test]
+fn the_density_is_that_of_choosing_cells() {
+    for (k, scale) in [1e-36, 1e-20, 1.0, 1e20, 1e36].into_iter().enumerate() {
+        let mut random = Rng::new(k as u64);
+        let map = map(33, 17, |x, y| scale * if (x, y) == (20, 5) { 90.0 } else { random.unit_f32() });
+        for compensation in [MisCompensation::Off, MisCompensation::On] {
+            let density = map.density(compensation).unwrap();
+            for (x, y) in (0..=17).flat_map(|y| (0..33).map(move |x| (x, y))) {
+                let expected = density.cells.pmf(x, y) * map.inverse_solid_angles[y];
+                let pdf = density.pdf(map.corners(x, y));
+                assert!((pdf - expected).abs() <= 2e-6 * expected + 1e-7, "{scale} {x} {y} {pdf} {expected}");
+            }
+        }
     }
 }
 
@@ -85,7 +102,7 @@ fn wherever_there_is_light_the_density_is_positive() {
         for _ in 0..20_000 {
             let d = random.direction().as_vec3();
             let at = map.locate(d);
-            assert!(map.lookup(at).is_black() || map.pdf(at, MisCompensation::Off) > 0.0, "{d}");
+            assert!(map.lookup(at).is_black() || pdf_at(&map, at) > 0.0, "{d}");
         }
     }
 }
