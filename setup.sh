@@ -3,14 +3,15 @@
 #
 #   ./setup.sh          install what is missing, build, render scenes/gallery.json to gallery.exr and gallery.png
 #   ./setup.sh test     install what is missing, run all tests
-#   ./setup.sh install  install what is missing, build for this machine, put `steradian` into ~/.cargo/bin
+#   ./setup.sh install  install what is missing, build with link-time optimization, put `steradian` into ~/.cargo/bin
+#                       (both build for the processor of this machine)
 #   ./setup.sh package  install what is missing, build, make a Debian package in target/debian
 set -euo pipefail
 cd "$(dirname "$0")"
 
 case "${1:-render}" in
     render | test | install | package) ;;
-    -h | --help) sed -n '2,8s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    -h | --help) sed -n '2,9s/^# \{0,1\}//p' "$0"; exit 0 ;;
     *) echo "setup.sh: unknown command '$1' (render, test, install or package)" >&2; exit 2 ;;
 esac
 
@@ -24,6 +25,14 @@ has_libclang() {
         esac
     done
     return 1
+}
+
+# With the instructions of this machine, if it has them (AVX2 and others): a few per cent faster, with the same pictures.
+build_for_this_machine() {
+    local loader=/lib64/ld-linux-x86-64.so.2
+    if [ -x "$loader" ] && "$loader" --help 2>/dev/null | grep 'x86-64-v3 (supported' >/dev/null; then
+        export RUSTFLAGS="${RUSTFLAGS:-} -C target-cpu=x86-64-v3"
+    fi
 }
 
 as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
@@ -54,19 +63,16 @@ fi
 
 case "${1:-render}" in
     render)
+        build_for_this_machine
         # Without benchmarks and their dependencies, which a render does not need.
         cargo run --release --locked --package steradian-cli --no-default-features -- render scenes/gallery.json -o gallery.exr -o gallery.png
         echo "The picture: $PWD/gallery.png (for a screen) and $PWD/gallery.exr (linear, for compositing)" >&2
-        echo "The program: $PWD/target/release/steradian (./setup.sh install compiles one for this machine into ~/.cargo/bin)" >&2
+        echo "The program: $PWD/target/release/steradian (./setup.sh install puts one with link-time optimization into ~/.cargo/bin)" >&2
         ;;
     # With the features of the Python module's dependencies, so that CI compiles the library once.
     test) cargo test --locked --workspace --exclude xtask --exclude steradian-benches ;;
     install)
-        # With the instructions of this machine, if it has them (AVX2 and others): a few per cent faster, with the same pictures.
-        loader=/lib64/ld-linux-x86-64.so.2
-        if [ -x "$loader" ] && "$loader" --help 2>/dev/null | grep 'x86-64-v3 (supported' >/dev/null; then
-            export RUSTFLAGS="${RUSTFLAGS:-} -C target-cpu=x86-64-v3"
-        fi
+        build_for_this_machine
         cargo install --locked --profile dist --path crates/cli
         ;;
     package)

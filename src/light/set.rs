@@ -162,8 +162,8 @@ impl LightSet {
             return distribution.choose_by_tree(tree, from, u);
         }
         let table = distribution.table.as_ref()?;
-        let chosen = table.sample(u[0]);
-        Some(LightChoice { id: LightId::new(chosen.index), pmf: table.pmf(chosen.index) })
+        let index = table.index(u[0]);
+        Some(LightChoice { id: LightId::new(index), pmf: table.pmf(index) })
     }
 
     /// Probability with which [`choose`](Self::choose) takes this light for `from`.

@@ -1,5 +1,7 @@
 //! Discrete distributions.
 
+use std::hint::select_unpredictable;
+
 use crate::math::float::ONE_MINUS_EPSILON;
 
 /// An index chosen by an [`AliasTable`].
@@ -83,12 +85,8 @@ impl AliasTable {
         if self.bins.len() == 1 {
             return DiscreteSample { index: 0, u };
         }
-        // `u` represents the 2^-24 wide interval that begins with it; the middle keeps the rounding of the bins' limits
-        // free of bias.
-        let x = (f64::from(u) + 0.5 / f64::from(1 << 24)) * self.bins.len() as f64;
-        let i = (x as usize).min(self.bins.len() - 1);
+        let (i, within) = self.bin_at(u);
         let bin = self.bins[i];
-        let within = (x - i as f64) as f32;
         let (index, rest) = if within < bin.own {
             (i, within / bin.own)
         } else {
@@ -96,6 +94,24 @@ impl AliasTable {
         };
         // A bin of its own entry alone has nothing above: a number rounded up to 1 gives 0 / 0.
         DiscreteSample { index, u: if rest < 1.0 { rest } else { ONE_MINUS_EPSILON } }
+    }
+
+    /// The entry of [`sample`](Self::sample) alone, without branches.
+    #[inline(always)]
+    pub fn index(&self, u: f32) -> usize {
+        let (i, within) = self.bin_at(u);
+        let bin = self.bins[i];
+        select_unpredictable(within < bin.own, i, bin.alias as usize)
+    }
+
+    /// A bin, and where in it `u` is.
+    #[inline(always)]
+    fn bin_at(&self, u: f32) -> (usize, f32) {
+        // `u` represents the 2^-24 wide interval that begins with it; the middle keeps the rounding of the bins' limits
+        // free of bias.
+        let x = (f64::from(u) + 0.5 / f64::from(1 << 24)) * self.bins.len() as f64;
+        let i = (x as usize).min(self.bins.len() - 1);
+        (i, (x - i as f64) as f32)
     }
 
     /// The probability of an entry.
