@@ -194,7 +194,7 @@ pub fn replay(
     let mut workspace = workspace.into_inner().unwrap_or_else(PoisonError::into_inner);
     let pixel = pixel.map(|x| x + renderer.grid.offset);
     let origin = pixel.map(|x| x / TILE_SIZE * TILE_SIZE);
-    renderer.render_batch(origin, sample, Guidance::default(), &mut workspace);
+    renderer.render_batch(origin, sample..sample + 1, Guidance::default(), &mut workspace);
     let slot = slot_of_pixel([pixel[0] - origin[0], pixel[1] - origin[1]]);
     let place = slots(renderer.grid.area, origin).position(|other| other == slot);
     let out = &workspace.integrator.out;

@@ -53,6 +53,9 @@ pub(super) struct TileRenderer<'a> {
     light_tracing: Option<LightTracing>,
 }
 
+/// Samples of each pixel that a wave of paths has: late bounces, of which few paths have any, then cost less.
+const SAMPLES_AT_ONCE: u32 = 4;
+
 /// The buffers of one thread.
 pub(super) struct TileWorkspace {
     samples: CameraBatch,
@@ -73,7 +76,7 @@ pub(super) struct TileWorkspace {
 
 impl Default for TileWorkspace {
     fn default() -> Self {
-        let count = (TILE_SIZE * TILE_SIZE) as usize;
+        let count = (SAMPLES_AT_ONCE * TILE_SIZE * TILE_SIZE) as usize;
         Self {
             samples: CameraBatch::default(),
             places: vec![FilterSample { offset: Vec2::ZERO, weight: 1.0 }; count],
@@ -249,13 +252,21 @@ impl<'a> TileRenderer<'a> {
         counts
     }
 
-    /// Renders one sample of every pixel of the tile with this origin, in the order of [`slots`].
-    pub fn render_batch(&self, origin: [u32; 2], sample: u32, guidance: Guidance, workspace: &mut TileWorkspace) {
-        let pixels = slots(self.grid.area, origin).map(pixel_of_slot);
-        self.render_samples(pixels.map(|[dx, dy]| ([origin[0] + dx, origin[1] + dy], sample)), guidance, workspace);
+    /// Renders samples of every pixel of the tile with this origin, each in the order of [`slots`].
+    pub fn render_batch(
+        &self,
+        origin: [u32; 2],
+        samples: Range<u32>,
+        guidance: Guidance,
+        workspace: &mut TileWorkspace,
+    ) {
+        let pixels = || slots(self.grid.area, origin).map(pixel_of_slot);
+        let samples =
+            samples.flat_map(|sample| pixels().map(move |[dx, dy]| ([origin[0] + dx, origin[1] + dy], sample)));
+        self.render_samples(samples, guidance, workspace);
     }
 
-    /// Renders samples of pixels, at most as many as a tile has pixels; the values are in their order.
+    /// Renders samples of pixels, at most [`SAMPLES_AT_ONCE`] for each of a tile; the values are in their order.
     #[inline]
     pub fn render_samples(
         &self,
@@ -362,15 +373,22 @@ impl<'a> TileRenderer<'a> {
                 });
             }
         }
-        for sample in samples {
-            self.render_batch(origin, sample, guidance, workspace);
+        let slots = slots(self.grid.area, origin).count() as u32;
+        // What a guide learns is summed by wave.
+        let at_once = if guidance.learner.is_some() { 1 } else { SAMPLES_AT_ONCE };
+        for first in samples.clone().step_by(at_once as usize) {
+            let samples = first..samples.end.min(first + at_once);
+            self.render_batch(origin, samples.clone(), guidance, workspace);
             if self.context.is_cancelled() {
                 break;
             }
-            for placed in &mut workspace.placed {
-                (placed.sample, placed.weight) = (sample, workspace.places[placed.slot as usize].weight);
+            for sample in samples {
+                for placed in &mut workspace.placed {
+                    placed.slot = placed.slot % slots + (sample - first) * slots;
+                    (placed.sample, placed.weight) = (sample, workspace.places[placed.slot as usize].weight);
+                }
+                self.add_batch(tile, workspace);
             }
-            self.add_batch(tile, workspace);
         }
         count
     }

@@ -1,6 +1,6 @@
 //! Path tracing with next-event estimation and multiple importance sampling, a wave of paths at a time.
 //!
-//! A wave is one sample of every pixel of a tile. Each round of the main loop lengthens all its paths by a segment,
+//! A wave has a few samples of every pixel of a tile. Each round of the main loop lengthens all its paths by a segment,
 //! stage by stage: trace, walks below surfaces, media, vertices, misses, materials, emission, splitting, direct light,
 //! scatter, shadow rays. Stages work on blocks of `BATCH` paths, whose state is in structures of arrays. Each path
 //! draws its random numbers from its own (pixel, sample, bounce), so a path is the same in any wave. "Vectorized

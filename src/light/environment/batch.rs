@@ -196,7 +196,7 @@ fn interpolate_rows(locations: &LocationRows, corners: &CornerRows, radiance: &m
 
 #[inline(always)]
 fn find_pdfs(density: &CellDensity, corners: &CornerRows, pdfs: &mut Row, count: usize) {
-    for i in 0..whole_vectors(count) {
-        pdfs[i] = density.pdf(corners.of_cell(i));
+    for (i, pdf) in pdfs[..whole_vectors(count)].iter_mut().enumerate() {
+        *pdf = density.pdf(corners.of_cell(i));
     }
 }
