@@ -53,8 +53,8 @@ pub(super) struct TileRenderer<'a> {
     light_tracing: Option<LightTracing>,
 }
 
-/// Samples of each pixel that a wave of paths has: late bounces, of which few paths have any, then cost less.
-const SAMPLES_AT_ONCE: u32 = 4;
+/// The most samples per pixel in a wave of paths: the more there are, the fuller are the blocks of late bounces.
+const WAVE_SPP: u32 = 4;
 
 /// The buffers of one thread.
 pub(super) struct TileWorkspace {
@@ -76,7 +76,7 @@ pub(super) struct TileWorkspace {
 
 impl Default for TileWorkspace {
     fn default() -> Self {
-        let count = (SAMPLES_AT_ONCE * TILE_SIZE * TILE_SIZE) as usize;
+        let count = (WAVE_SPP * TILE_SIZE * TILE_SIZE) as usize;
         Self {
             samples: CameraBatch::default(),
             places: vec![FilterSample { offset: Vec2::ZERO, weight: 1.0 }; count],
@@ -266,7 +266,7 @@ impl<'a> TileRenderer<'a> {
         self.render_samples(samples, guidance, workspace);
     }
 
-    /// Renders samples of pixels, at most [`SAMPLES_AT_ONCE`] for each of a tile; the values are in their order.
+    /// Renders samples of pixels, at most [`WAVE_SPP`] for each of a tile; the values are in their order.
     #[inline]
     pub fn render_samples(
         &self,
@@ -373,18 +373,16 @@ impl<'a> TileRenderer<'a> {
                 });
             }
         }
-        let slots = slots(self.grid.area, origin).count() as u32;
-        // What a guide learns is summed by wave.
-        let at_once = if guidance.learner.is_some() { 1 } else { SAMPLES_AT_ONCE };
-        for first in samples.clone().step_by(at_once as usize) {
-            let samples = first..samples.end.min(first + at_once);
+        let slot_count = slots(self.grid.area, origin).count() as u32;
+        for first in samples.clone().step_by(WAVE_SPP as usize) {
+            let samples = first..samples.end.min(first + WAVE_SPP);
             self.render_batch(origin, samples.clone(), guidance, workspace);
             if self.context.is_cancelled() {
                 break;
             }
             for sample in samples {
                 for placed in &mut workspace.placed {
-                    placed.slot = placed.slot % slots + (sample - first) * slots;
+                    placed.slot = placed.slot % slot_count + (sample - first) * slot_count;
                     (placed.sample, placed.weight) = (sample, workspace.places[placed.slot as usize].weight);
                 }
                 self.add_batch(tile, workspace);

@@ -132,7 +132,7 @@ mod tests {
         let mut left = 0.0;
         for i in 0..n {
             let s = table.sample(i as f32 / n as f32);
-            assert!((0.0..1.0).contains(&s.u));
+            assert!((0.0..1.0).contains(&s.u) && s.index == table.index(i as f32 / n as f32));
             count[s.index] += 1;
             left += f64::from(s.u);
         }
