@@ -2,11 +2,12 @@
 
 use super::area::{AreaQueue, EmitterQueue};
 use super::environment::{EnvironmentScratch, InfiniteLightSampleRows};
+use super::set::LightChoiceRows;
 use super::{EnvironmentMap, Light, LightSample, LightSampleContext, LightSet, MisCompensation, ShadowTarget};
 use crate::color::Rgb;
 use crate::geometry::{Geometry, SpawnPoint};
 use crate::id::LightId;
-use crate::math::rows::{BATCH, DVec3Rows, Row, soa};
+use crate::math::rows::{BATCH, DVec3Rows, Vec3Rows, soa};
 use crate::math::{DVec3, Vec3};
 use crate::sampling::SampleRows;
 use crate::texture::Texture;
@@ -66,8 +67,7 @@ impl LightSampleRows {
 /// Vertices that sample lights, at most [`BATCH`]: area lights and the image around the scene are sampled for many of
 /// them at once.
 pub struct LightQueue {
-    /// Probability with which the light of each vertex was chosen.
-    pmfs: Row,
+    choices: LightChoiceRows,
     area: AreaQueue,
     emitters: EmitterQueue,
     sky: SkyQueue,
@@ -78,7 +78,7 @@ pub struct LightQueue {
 impl Default for LightQueue {
     fn default() -> Self {
         Self {
-            pmfs: [0.0; BATCH],
+            choices: LightChoiceRows::default(),
             area: AreaQueue::default(),
             emitters: EmitterQueue::default(),
             sky: SkyQueue::default(),
@@ -107,6 +107,8 @@ pub struct LightQueries<'a> {
     pub count: usize,
     /// Their points.
     pub points: &'a DVec3Rows,
+    /// The side that light must reach, as in [`LightSampleContext`].
+    pub normals: &'a Vec3Rows,
     /// Numbers in `[0, 1)`: the first and the last choose a light, the others a point of it.
     pub u: &'a SampleRows,
 }
@@ -117,6 +119,12 @@ impl LightQueries<'_> {
     pub(super) fn get(&self, lane: usize) -> (DVec3, [f32; 2]) {
         let [_, u, v, _] = self.u.of(lane);
         (self.points.get(lane), [u, v])
+    }
+
+    /// Where light is to arrive.
+    #[inline(always)]
+    pub(super) fn light_context(&self, lane: usize) -> LightSampleContext {
+        LightSampleContext { p: self.points.get(lane), n: self.normals.get(lane) }
     }
 }
 
@@ -134,23 +142,31 @@ impl LightQueue {
         self.alone.clear();
     }
 
-    /// Chooses a light for the vertex `lane` and queues its sample.
+    /// Chooses a light for each vertex that is wanted, and queues its sample.
     #[inline(always)]
-    pub fn push(
+    pub fn choose(
         &mut self,
         context: &LightContext,
-        lane: usize,
-        light_context: &LightSampleContext,
-        [u, _, _, v]: [f32; 4],
+        queries: &LightQueries,
+        is_wanted: impl Fn(usize) -> bool,
         samples: &mut LightSampleRows,
     ) {
-        let Some(choice) = context.lights.choose(light_context, [u, v], context.compensation) else { return };
-        (samples.light[lane], self.pmfs[lane]) = (choice.id.0, choice.pmf);
-        match context.lights.get(choice.id) {
-            Light::Area(light)
-                if self.area.push(light, choice.id, lane) || self.emitters.push(light, choice.id, lane) => {}
-            _ if context.lights.environment_map().is_some_and(|(id, _)| id == choice.id) => self.sky.lanes.push(lane),
-            _ => self.alone.push((lane, choice.id)),
+        context.lights.choose_rows(queries, &is_wanted, context.compensation, &mut self.choices);
+        samples.light = self.choices.light;
+        for lane in (0..queries.count.min(BATCH)).filter(|&lane| is_wanted(lane)) {
+            if self.choices.pmf[lane] > 0.0 {
+                self.push(context, lane, LightId(self.choices.light[lane]));
+            }
+        }
+    }
+
+    /// Queues a sample of a light for the vertex `lane`.
+    #[inline(always)]
+    fn push(&mut self, context: &LightContext, lane: usize, id: LightId) {
+        match context.lights.get(id) {
+            Light::Area(light) if self.area.push(light, id, lane) || self.emitters.push(light, id, lane) => {}
+            _ if context.lights.environment_map().is_some_and(|(map, _)| map == id) => self.sky.lanes.push(lane),
+            _ => self.alone.push((lane, id)),
         }
     }
 
@@ -162,7 +178,8 @@ impl LightQueue {
         samples: &mut LightSampleRows,
         target_p: &mut DVec3Rows,
     ) {
-        let Self { pmfs, area, emitters, sky, alone } = self;
+        let Self { choices, area, emitters, sky, alone } = self;
+        let pmfs = &choices.pmf;
         area.sample(queries, pmfs, samples, target_p);
         let mut set = |lane: usize, sample: &LightSample| samples.set(lane, sample, pmfs[lane], target_p);
         emitters.sample(context, queries, &mut set);

@@ -1,11 +1,13 @@
 //! All lights of a scene, and the sampling of one of them.
 
 use super::tree::{LightSampleContext, LightTree};
-use super::{Environment, EnvironmentMap, Light, MisCompensation};
+use super::{Environment, EnvironmentMap, Light, LightQueries, MisCompensation};
 use crate::geometry::Geometry;
 use crate::id::LightId;
 use crate::math::Aabb;
 use crate::math::float::ONE_MINUS_EPSILON;
+use crate::math::rows::{BATCH, soa, whole_vectors};
+use crate::math::vectorize::vectorize;
 use crate::sampling::AliasTable;
 
 /// A light chosen by [`LightSet::choose`].
@@ -15,6 +17,23 @@ pub struct LightChoice {
     pub id: LightId,
     /// Probability of the choice.
     pub pmf: f32,
+}
+
+soa! {
+    /// As [`LightChoice`]; without a choice, the probability is 0.
+    pub struct LightChoiceRows {
+        /// The light.
+        light: u32,
+        /// Probability of the choice.
+        pmf: f32,
+    }
+}
+
+impl LightChoiceRows {
+    #[inline(always)]
+    fn set(&mut self, lane: usize, choice: Option<LightChoice>) {
+        (self.light[lane], self.pmf[lane]) = choice.map_or((0, 0.0), |choice| (choice.id.0, choice.pmf));
+    }
 }
 
 /// How a light is chosen.
@@ -29,8 +48,8 @@ pub enum LightSelection {
 
 /// All lights of a scene and the probability with which each is chosen.
 ///
-/// Few lights are chosen in proportion to their power, many by a light tree over their positions and emission
-/// directions. What a light at infinity gives to a scene depends on the scene's size more than on what the camera sees;
+/// Two or more lights that are not at infinity are chosen by a light tree over their positions and emission directions,
+/// all others in proportion to their power. What a light at infinity gives to a scene depends on the scene's size more than on what the camera sees;
 /// so if there are both lights at infinity and others, either kind has at least a quarter of the choices. Where power
 /// decides, a twentieth of the choices of a kind is spread evenly, so that no light of positive power starves beside a
 /// strong one.
@@ -58,9 +77,8 @@ struct LightDistribution {
     tree_share: f32,
 }
 
-/// At least this many lights that are not at infinity are sampled by a tree. Where time is equal, it halves the error
-/// of 16 lights, and gains nothing on 3 or 4.
-const TREE_FROM: usize = 6;
+/// At least this many lights that are not at infinity are sampled by a tree.
+const TREE_FROM: usize = 2;
 
 /// Least share of the choices for lights at infinity, and for all others, if both exist.
 const LEAST_SHARE: f64 = 0.25;
@@ -166,6 +184,35 @@ impl LightSet {
         Some(LightChoice { id: LightId::new(index), pmf: table.pmf(index) })
     }
 
+    /// [`choose`](Self::choose) for many vertices at once: sets the lights of those that are wanted, and the
+    /// probabilities of the choices, 0 where there is none. Other lanes may be set too.
+    pub fn choose_rows(
+        &self,
+        queries: &LightQueries,
+        is_wanted: impl Fn(usize) -> bool,
+        compensation: MisCompensation,
+        choices: &mut LightChoiceRows,
+    ) {
+        let distribution = self.distribution(compensation);
+        match (&self.tree, &distribution.table) {
+            (None, None) => choices.pmf = [0.0; BATCH],
+            (None, Some(table)) => vectorize!(choose_from_table(table, queries, choices)),
+            (Some(tree), _) if tree.has_one_node() => {
+                tree.choose_rows(queries, distribution.tree_share, choices);
+                if distribution.tree_share < 1.0 {
+                    distribution.choose_at_infinity(queries, choices);
+                }
+            }
+            (Some(_), _) => {
+                for lane in (0..queries.count.min(BATCH)).filter(|&lane| is_wanted(lane)) {
+                    let [u, _, _, digits] = queries.u.of(lane);
+                    let choice = self.choose(&queries.light_context(lane), [u, digits], compensation);
+                    choices.set(lane, choice);
+                }
+            }
+        }
+    }
+
     /// Probability with which [`choose`](Self::choose) takes this light for `from`.
     #[inline]
     pub fn pmf(&self, id: LightId, from: &LightSampleContext, compensation: MisCompensation) -> f32 {
@@ -197,17 +244,46 @@ impl LightSet {
 
 impl LightDistribution {
     fn choose_by_tree(&self, tree: &LightTree, from: &LightSampleContext, u: [f32; 2]) -> Option<LightChoice> {
-        // Random numbers are multiples of 2^-24.
-        let u = f64::from(u[0]) + f64::from(u[1]) * (1.0 / 16_777_216.0);
-        let share = f64::from(self.tree_share);
+        let (u, share) = (with_digits(u), f64::from(self.tree_share));
         if u < share {
             let chosen = tree.choose(from, u / share)?;
             return Some(LightChoice { id: LightId(chosen.light), pmf: chosen.pmf * self.tree_share });
         }
-        let table = self.table.as_ref()?;
+        self.sample_infinity(u)
+    }
+
+    /// The choices beside a tree whose numbers are not below its share.
+    fn choose_at_infinity(&self, queries: &LightQueries, choices: &mut LightChoiceRows) {
+        for lane in 0..queries.count.min(BATCH) {
+            let [u, _, _, digits] = queries.u.of(lane);
+            let u = with_digits([u, digits]);
+            if u >= f64::from(self.tree_share) {
+                choices.set(lane, self.sample_infinity(u));
+            }
+        }
+    }
+
+    /// A light at infinity beside a tree, for a number that is not below its share.
+    fn sample_infinity(&self, u: f64) -> Option<LightChoice> {
+        let (table, share) = (self.table.as_ref()?, f64::from(self.tree_share));
         let chosen = table.sample(((u - share) / (1.0 - share)).clamp(0.0, f64::from(ONE_MINUS_EPSILON)) as f32);
         Some(LightChoice { id: LightId::new(chosen.index), pmf: table.pmf(chosen.index) * (1.0 - self.tree_share) })
     }
+}
+
+#[inline(always)]
+fn choose_from_table(table: &AliasTable, queries: &LightQueries, choices: &mut LightChoiceRows) {
+    for i in 0..whole_vectors(queries.count) {
+        let index = table.index(queries.u.of(i)[0]);
+        (choices.light[i], choices.pmf[i]) = (index as u32, table.pmf(index));
+    }
+}
+
+/// A number in `[0, 1)` of two, the second of which adds digits to the first.
+#[inline(always)]
+pub(super) fn with_digits([u, digits]: [f32; 2]) -> f64 {
+    // Random numbers are multiples of 2^-24.
+    f64::from(u) + f64::from(digits) * (1.0 / 16_777_216.0)
 }
 
 /// The probability of each light from its power and whether it is at infinity; all zero if no light has power.

@@ -114,13 +114,10 @@ fn choose_lights(context: &Context, vertices: &mut Vertices, queue: &mut LightQu
         compensation: context.compensation,
     };
     queue.clear();
-    for lane in (0..vertices.count.min(BATCH)).filter(|&lane| vertices.rows.flags[lane] & vertex_flags::UNSAMPLED == 0)
-    {
-        let from = vertices.light_context(lane);
-        queue.push(&light_context, lane, &from, vertices.u_light.of(lane), &mut vertices.light_samples);
-    }
-    let Vertices { count, points, u_light, light_samples, .. } = vertices;
-    let queries = LightQueries { count: *count, points: &points.p, u: u_light };
+    let Vertices { count, rows, points, u_light, light_samples, .. } = vertices;
+    let queries = LightQueries { count: *count, points: &points.p, normals: &rows.light_context_n, u: u_light };
+    let is_wanted = |lane: usize| rows.flags[lane] & vertex_flags::UNSAMPLED == 0;
+    queue.choose(&light_context, &queries, is_wanted, light_samples);
     queue.sample(&light_context, &queries, light_samples, &mut points.target_p);
     if context.config.strategy == Strategy::Bsdf {
         for lane in (0..BATCH).filter(|&lane| light_samples.is_delta[lane] == 0) {

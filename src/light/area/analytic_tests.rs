@@ -5,7 +5,7 @@ use super::*;
 use crate::geometry::{Disk, Frustum, Quad, Sphere};
 use crate::id::LightId;
 use crate::light::{Light, LightContext, LightQueries, LightSet, MisCompensation};
-use crate::math::rows::{BATCH, DVec3Rows};
+use crate::math::rows::{BATCH, DVec3Rows, Vec3Rows};
 use crate::math::{DAffine3, DMat3, Rng, Transform};
 use crate::sampling::SampleRows;
 
@@ -150,9 +150,13 @@ fn emitters_sampled_together_have_the_bits_of_those_sampled_alone() {
             assert!(queue.push(&lights[*i], LightId::new(*i), lane));
         }
         let mut found = vec![None; BATCH];
-        queue.sample(&context, &LightQueries { count: BATCH, points: &points, u: &numbers }, |lane, sample| {
-            found[lane] = Some(*sample);
-        });
+        queue.sample(
+            &context,
+            &LightQueries { count: BATCH, points: &points, normals: &Vec3Rows::ZERO, u: &numbers },
+            |lane, sample| {
+                found[lane] = Some(*sample);
+            },
+        );
         for ((i, p, u), found) in vertices.iter().zip(&found) {
             let alone = lights[*i].sample(&geometry, &[], *p, *u);
             assert_eq!(found.as_ref().map(words), alone.as_ref().map(words), "{i} {p} {u:?}");

@@ -5,7 +5,7 @@ use crate::id::LightId;
 use crate::light::test_support::assert_chi_squared;
 use crate::light::{LightQueries, LightSampleRows, light_target};
 use crate::math::Rng;
-use crate::math::rows::{BATCH, DVec3Rows};
+use crate::math::rows::{BATCH, DVec3Rows, Vec3Rows};
 use crate::sampling::SampleRows;
 
 const WHITE: Emission = Emission::constant(Rgb::WHITE);
@@ -191,7 +191,12 @@ fn queued_samples_have_the_bits_of_single_ones() {
             assert!(!is_queued(lane) || queue.push(&lights[*i], LightId::new(*i), lane));
         }
         let (mut samples, mut target_p) = (LightSampleRows::default(), DVec3Rows::ZERO);
-        queue.sample(&LightQueries { count, points: &points, u: &numbers }, &[0.5; BATCH], &mut samples, &mut target_p);
+        queue.sample(
+            &LightQueries { count, points: &points, normals: &Vec3Rows::ZERO, u: &numbers },
+            &[0.5; BATCH],
+            &mut samples,
+            &mut target_p,
+        );
         let mut sampled = 0;
         for (lane, (i, p, u)) in vertices.iter().enumerate() {
             let found = (samples.target[lane] == light_target::POINT).then(|| {

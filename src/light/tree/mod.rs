@@ -8,6 +8,7 @@
 
 mod build;
 mod node;
+mod rows;
 #[cfg(test)]
 mod tests;
 

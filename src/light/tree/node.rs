@@ -13,9 +13,16 @@ const SLACK: f32 = 1e-3;
 /// Least value of a cosine that is not cut off.
 const LEAST_COSINE: f32 = 1e-3;
 
+/// Near the horizon of a sphere, the mean cosine falls with the square of what is above, the largest in proportion to
+/// it: at least this share of the largest counts, for all the light may come from there.
+const LEAST_SHARE: f32 = 0.125;
+
+/// Limit of an importance: sums stay finite.
+const LARGEST: f32 = f32::MAX * f32::EPSILON;
+
 /// A group is near if its squared distance is below this many times its squared radius. On a room with 320 lights,
-/// error times time is least between 1 and 3.
-const NEAR: f32 = 2.0;
+/// error times time is least between 1 and 2.
+const NEAR: f32 = 1.5;
 
 /// One number of each child.
 type Lanes = [f32; WIDTH];
@@ -24,7 +31,7 @@ type Lanes = [f32; WIDTH];
 #[derive(Clone, Debug)]
 pub(super) struct Node {
     center: [Lanes; 3],
-    radius: Lanes,
+    inverse_radius: Lanes,
     axis: [Lanes; 3],
     /// Cosine and sine of the normals' spread.
     cos_spread: Lanes,
@@ -35,6 +42,18 @@ pub(super) struct Node {
     intensity: Lanes,
     /// A node, or [`LEAF`](super::LEAF) and a light.
     child: [u32; WIDTH],
+}
+
+/// What is known of one child.
+#[derive(Clone, Copy)]
+pub(super) struct ChildBounds {
+    center: Vec3,
+    inverse_radius: f32,
+    axis: Vec3,
+    cos_spread: f32,
+    sin_spread: f32,
+    cos_reach: f32,
+    intensity: f32,
 }
 
 /// What the children of a node give at a point.
@@ -48,7 +67,7 @@ pub(super) struct Importances {
 impl Node {
     pub const EMPTY: Self = Self {
         center: [[0.0; WIDTH]; 3],
-        radius: [0.0; WIDTH],
+        inverse_radius: [0.0; WIDTH],
         axis: [[0.0; WIDTH]; 3],
         cos_spread: [1.0; WIDTH],
         sin_spread: [0.0; WIDTH],
@@ -67,7 +86,7 @@ impl Node {
             self.axis[k][slot] = axis[k];
         }
         // Widened by the rounding of the centre and of points near it.
-        self.radius[slot] = reach.length() + 4.0 * f32::EPSILON * center.abs().max_element();
+        self.inverse_radius[slot] = 1.0 / (reach.length() + 4.0 * f32::EPSILON * center.abs().max_element());
         (self.sin_spread[slot], self.cos_spread[slot]) = bounds.cone.spread.sin_cos();
         self.cos_reach[slot] = bounds.cone.reach.cos() - SLACK;
         self.intensity[slot] = if bounds.two_sided { -bounds.intensity } else { bounds.intensity };
@@ -80,47 +99,78 @@ impl Node {
         self.child[slot]
     }
 
+    /// How many children there are.
+    #[inline(always)]
+    pub fn count(&self) -> usize {
+        self.child.iter().position(|&child| child == NONE).unwrap_or(WIDTH)
+    }
+
+    /// What is known of a child.
+    #[inline(always)]
+    pub fn bounds(&self, slot: usize) -> ChildBounds {
+        let vector = |rows: &[Lanes; 3]| Vec3::new(rows[0][slot], rows[1][slot], rows[2][slot]);
+        ChildBounds {
+            center: vector(&self.center),
+            inverse_radius: self.inverse_radius[slot],
+            axis: vector(&self.axis),
+            cos_spread: self.cos_spread[slot],
+            sin_spread: self.sin_spread[slot],
+            cos_reach: self.cos_reach[slot],
+            intensity: self.intensity[slot],
+        }
+    }
+
     /// What each child gives at `p` on a surface with the normal `n`, or (if that is zero) from any side.
     #[inline(always)]
     pub fn importances(&self, p: Vec3, n: Vec3) -> Importances {
         let (mut of, mut near) = ([0.0; WIDTH], [0; WIDTH]);
         let from_any_side = n == Vec3::ZERO;
         for i in 0..WIDTH {
-            (of[i], near[i]) = self.importance(i, p, n, from_any_side);
+            (of[i], near[i]) = self.bounds(i).importance(p, n, from_any_side);
         }
         Importances { of, near: (0..WIDTH).fold(0, |bits, i| bits | near[i] << i) }
     }
+}
 
-    /// Of one child, without branches.
+impl ChildBounds {
+    /// What the child gives, as [`Importances`] has it, and whether it is near; without branches.
     #[inline(always)]
-    fn importance(&self, i: usize, p: Vec3, n: Vec3, from_any_side: bool) -> (f32, u32) {
-        let [x, y, z] = [self.center[0][i] - p.x, self.center[1][i] - p.y, self.center[2][i] - p.z];
-        let (radius, intensity) = (self.radius[i], self.intensity[i]);
+    pub fn importance(&self, p: Vec3, n: Vec3, from_any_side: bool) -> (f32, u32) {
+        let [x, y, z] = [self.center.x - p.x, self.center.y - p.y, self.center.z - p.z];
+        let (inverse_radius, intensity) = (self.inverse_radius, self.intensity);
         let distance_squared = larger(x * x + y * y + z * z, f32::MIN_POSITIVE);
-        let inverse_distance = 1.0 / distance_squared.sqrt();
+        let distance = distance_squared.sqrt();
+        let inverse_distance = 1.0 / distance;
 
         // The sine of the angle that the child's bounding sphere fills; inside of it all angles do.
-        let sin_bound = smaller(radius * inverse_distance, 1.0);
-        let cos_squared_bound = 1.0 - sin_bound * sin_bound;
-        // An upper limit of cos(angle - bound) without roots: the bound's cosine lies between its square and 1.
-        let widened = |cos: f32| smaller(larger(cos, cos * cos_squared_bound) + sin_bound, 1.0);
-        let kept = |cos: f32, limit: f32| if cos < limit { 0.0 } else { larger(cos, LEAST_COSINE) };
+        let inverse_sin_bound = larger(distance * inverse_radius, 1.0);
+        let sin_bound = 1.0 / inverse_sin_bound;
+        // The mean of the cosine over that sphere, of which a part may be below the horizon.
+        let mean = |cos: f32| {
+            let above = larger(cos + sin_bound, 0.0);
+            let partial = above * (above * inverse_sin_bound * (0.25 - 0.5 * LEAST_SHARE) + LEAST_SHARE);
+            larger(if cos >= sin_bound { cos } else { partial }, LEAST_COSINE)
+        };
 
         // The angle between emission and the nearest normal.
-        let cos_axis = (x * self.axis[0][i] + y * self.axis[1][i] + z * self.axis[2][i]) * -inverse_distance;
+        let cos_axis = (x * self.axis.x + y * self.axis.y + z * self.axis.z) * -inverse_distance;
         let cos_axis = if intensity < 0.0 { cos_axis.abs() } else { cos_axis };
         let sin_axis = larger(1.0 - cos_axis * cos_axis, 0.0).sqrt();
-        let cos_normal = cos_axis * self.cos_spread[i] + sin_axis * self.sin_spread[i];
-        let cos_normal = if cos_axis >= self.cos_spread[i] { 1.0 } else { cos_normal };
-        let emission = kept(widened(cos_normal), self.cos_reach[i]);
+        let cos_normal = cos_axis * self.cos_spread + sin_axis * self.sin_spread;
+        let cos_normal = if cos_axis >= self.cos_spread { 1.0 } else { cos_normal };
+        // An upper limit of cos(angle - bound) without roots: the bound's cosine lies between its square and 1.
+        let nearest = smaller(larger(cos_normal, cos_normal * (1.0 - sin_bound * sin_bound)) + sin_bound, 1.0);
+        let emission = if nearest < self.cos_reach { 0.0 } else { mean(cos_normal) };
 
         // The angle between arrival and the receiver's normal.
         let cos_arrival = (x * n.x + y * n.y + z * n.z) * inverse_distance;
-        let arrival = kept(widened(if from_any_side { 1.0 } else { cos_arrival }), -SLACK);
+        let cos_arrival = if from_any_side { 1.0 } else { cos_arrival };
+        let arrival = if cos_arrival + sin_bound < -SLACK { 0.0 } else { mean(cos_arrival) };
 
-        let radius_squared = radius * radius;
-        let near = u32::from(distance_squared < NEAR * radius_squared);
-        (intensity.abs() * emission * arrival / larger(distance_squared, 0.5 * radius_squared), near)
+        let inverse_radius_squared = inverse_radius * inverse_radius;
+        let near = u32::from(distance_squared * inverse_radius_squared < NEAR);
+        let inverse_square = smaller(inverse_distance * inverse_distance, 2.0 * inverse_radius_squared);
+        (smaller(intensity.abs() * emission * arrival * inverse_square, LARGEST), near)
     }
 }
 

@@ -2,11 +2,14 @@ use super::*;
 use crate::color::Rgb;
 use crate::geometry::{Analytic, Disk, Geometry, Mesh, Quad, Shape, Sphere, TransformedShape};
 use crate::id::{LightId, ShapeId};
+use crate::light::set::LightChoiceRows;
 use crate::light::{
-    AreaLight, Emission, Environment, IesLight, IesProfile, Light, LightSelection, LightSet, MisCompensation,
-    PointLight, SpotLight,
+    AreaLight, Emission, Environment, IesLight, IesProfile, Light, LightQueries, LightSelection, LightSet,
+    MisCompensation, PointLight, SpotLight,
 };
+use crate::math::rows::{BATCH, DVec3Rows, Vec3Rows};
 use crate::math::{DAffine3, Rng, Transform};
+use crate::sampling::SampleRows;
 
 const CLOUD: usize = 40;
 
@@ -149,4 +152,40 @@ fn any_arrangement_of_lights_makes_a_tree_of_bounded_size() {
         }
     }
     assert!(LightTree::new(&[None, None]).is_none());
+}
+
+#[test]
+fn choices_of_rows_are_those_of_single_vertices() {
+    let mut random = Rng::new(21);
+    let (mut with_choice, mut without) = (0, 0);
+    for (count, sky) in [(1, false), (2, false), (3, true), (8, false), (8, true), (9, true)] {
+        let (geometry, all) = cloud(count, sky);
+        let lights = all.lights();
+        let mut chosen: Vec<_> = (0..count as usize).map(|_| lights[random.below(lights.len() - 1)].clone()).collect();
+        chosen.extend(lights.last().filter(|_| sky).cloned());
+        let set = LightSet::with_selection(chosen, &geometry, LightSelection::Tree);
+        let receivers = receivers(count, BATCH);
+        let (mut points, mut normals) = (DVec3Rows::ZERO, Vec3Rows::ZERO);
+        for (lane, from) in receivers.iter().enumerate() {
+            points.set(lane, from.p);
+            normals.set(lane, from.n);
+        }
+        let numbers: Vec<_> = (0..BATCH).map(|_| [random.unit_f32(), 0.0, 0.0, random.unit_f32()]).collect();
+        let u = SampleRows::new(&numbers);
+        for lanes in [1, 17, BATCH] {
+            let queries = LightQueries { count: lanes, points: &points, normals: &normals, u: &u };
+            let mut choices = LightChoiceRows::default();
+            set.choose_rows(&queries, |_| true, MisCompensation::Off, &mut choices);
+            for (lane, (from, [u, _, _, digits])) in receivers.iter().zip(&numbers).enumerate().take(lanes) {
+                let alone = set.choose(from, [*u, *digits], MisCompensation::Off);
+                let found = Some((choices.light[lane], choices.pmf[lane])).filter(|found| found.1 > 0.0);
+                assert_eq!(found, alone.map(|choice| (choice.id.0, choice.pmf)), "{count} {lane} {from:?}");
+                let pmf = alone.map(|choice| set.pmf(choice.id, from, MisCompensation::Off));
+                assert_eq!(pmf, alone.map(|choice| choice.pmf));
+                with_choice += usize::from(alone.is_some());
+                without += usize::from(alone.is_none());
+            }
+        }
+    }
+    assert!(with_choice > 500 && without > 20, "{with_choice} {without}");
 }
