@@ -22,7 +22,7 @@ pub fn scene(filter: &str) -> Value {
         "film": { "width": 41, "height": 37, "filter": { "type": filter } },
         "camera": { "position": [0, 1.2, 4], "look_at": [0, 0.5, 0], "lens": { "radius": 0.05, "focus_distance": 4 } },
         "sampler": { "spp": 24 },
-        "integrator": { "type": "path", "max_depth": 5 },
+        "integrator": { "type": "path", "max_depth": 5, "caustics": "paths", "bidirectional": "off" },
         "materials": {
             "grey": { "type": "diffuse" }, "glass": { "type": "dielectric" },
             "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 }

@@ -83,9 +83,11 @@ fn the_picture_does_not_depend_on_how_lights_are_chosen() {
 }
 
 #[test]
-fn few_lights_are_chosen_by_power() {
+fn one_light_is_chosen_by_power_and_two_by_a_tree() {
     let mut scene = room();
     scene["lights"] = json!([]);
-    scene["shapes"].as_array_mut().unwrap().truncate(6);
-    assert_eq!(prepare(&scene, &Overrides::default()).scene.lights.selection(), LightSelection::Power);
+    for (shapes, selection) in [(6, LightSelection::Tree), (5, LightSelection::Power)] {
+        scene["shapes"].as_array_mut().unwrap().truncate(shapes);
+        assert_eq!(prepare(&scene, &Overrides::default()).scene.lights.selection(), selection);
+    }
 }

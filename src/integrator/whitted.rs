@@ -280,7 +280,13 @@ impl Whitted {
         tally.light_samples = tally.light_samples.wrapping_add(1);
         let [u, v, ..] = self.sampler.sample_4d(tally.sample.seed, tally.sample.sample, set);
         let (at, light) = (vertex.at, world.scene.lights.get(id));
-        let sample = light.sample(&world.scene.geometry, &world.scene.textures, at.p, [u, v], MisCompensation::Off)?;
+        let sample = light.sample(
+            &world.scene.geometry,
+            &world.scene.textures,
+            &vertex.light_context(),
+            [u, v],
+            MisCompensation::Off,
+        )?;
         let (eval, start) = vertex.eval_toward(world, sample.wi)?;
         let scattered = eval.value * sample.radiance / sample.pdf;
         if scattered.is_black() {

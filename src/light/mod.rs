@@ -165,18 +165,19 @@ impl Light {
         matches!(self, Self::Directional(_) | Self::Environment(_))
     }
 
-    /// Light that arrives at `p` from a chosen direction, `u` in the unit square; `None` where nothing can arrive.
+    /// Light that arrives from a chosen direction, `u` in the unit square; `None` where nothing can arrive.
     #[inline]
     pub fn sample(
         &self,
         geometry: &Geometry,
         textures: &[Texture],
-        p: DVec3,
+        from: &LightSampleContext,
         u: [f32; 2],
         compensation: MisCompensation,
     ) -> Option<LightSample> {
+        let p = from.p;
         match self {
-            Self::Area(light) => light.sample(geometry, textures, p, u),
+            Self::Area(light) => light.sample(geometry, textures, from, u),
             Self::Point(light) => light.sample(p),
             Self::Spot(light) => light.sample(textures, p),
             Self::Projector(light) => light.sample(textures, p),
@@ -184,6 +185,11 @@ impl Light {
             Self::Directional(light) => light.sample(u),
             Self::Environment(light) => light.sample(u, compensation),
         }
+    }
+
+    /// As [`AreaLight::side_factor`].
+    pub fn side_factor(&self, from: &LightSampleContext, q: DVec3) -> f32 {
+        if let Self::Area(light) = self { light.side_factor(from, q) } else { 1.0 }
     }
 
     /// Where the light is and how it shines; `None` for lights at infinity and those that do not shine.

@@ -187,10 +187,14 @@ impl LightQueue {
             sky.sample(image, context.compensation, queries, &mut set);
         }
         for &(lane, id) in &*alone {
-            let (p, u) = queries.get(lane);
-            if let Some(sample) =
-                context.lights.get(id).sample(context.geometry, context.textures, p, u, context.compensation)
-            {
+            let (_, u) = queries.get(lane);
+            if let Some(sample) = context.lights.get(id).sample(
+                context.geometry,
+                context.textures,
+                &queries.light_context(lane),
+                u,
+                context.compensation,
+            ) {
                 set(lane, &sample);
             }
         }

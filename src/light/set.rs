@@ -49,10 +49,10 @@ pub enum LightSelection {
 /// All lights of a scene and the probability with which each is chosen.
 ///
 /// Two or more lights that are not at infinity are chosen by a light tree over their positions and emission directions,
-/// all others in proportion to their power. What a light at infinity gives to a scene depends on the scene's size more than on what the camera sees;
-/// so if there are both lights at infinity and others, either kind has at least a quarter of the choices. Where power
-/// decides, a twentieth of the choices of a kind is spread evenly, so that no light of positive power starves beside a
-/// strong one.
+/// all others in proportion to their power. What a light at infinity gives to a scene depends on the scene's size more
+/// than on what the camera sees; so if there are both lights at infinity and others, either kind has at least a quarter
+/// of the choices. Where power decides, a twentieth of the choices of a kind is spread evenly, so that no light of
+/// positive power starves beside a strong one.
 ///
 /// With [compensation](MisCompensation::On) an environment counts with the power that its lowered density leaves.
 #[derive(Clone, Debug, Default)]

@@ -201,6 +201,39 @@ impl BilinearWarp {
     }
 }
 
+/// A density on the unit square that is bilinear between its corners.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BilinearDensity {
+    /// In proportion to the density at (0, 0), (1, 0), (1, 1) and (0, 1); above 0.
+    pub corners: [f32; 4],
+}
+
+impl BilinearDensity {
+    /// The densities at both ends of the row at `y`, up to a common factor.
+    #[inline(always)]
+    fn ends(&self, y: f32) -> [f32; 2] {
+        let [c00, c10, c11, c01] = self.corners;
+        [(1.0 - y) * c00 + y * c01, (1.0 - y) * c10 + y * c11]
+    }
+
+    /// The place of a pair of uniform numbers.
+    #[inline(always)]
+    pub fn sample(&self, [u, v]: [f32; 2]) -> [f32; 2] {
+        let [c00, c10, c11, c01] = self.corners;
+        let (low, high) = (c00 + c10, c01 + c11);
+        let y = solve_trapezoid([low, high], 0.5 * (low + high) * v);
+        let [left, right] = self.ends(y);
+        [solve_trapezoid([left, right], 0.5 * (left + right) * u), y]
+    }
+
+    /// The density at a place.
+    #[inline(always)]
+    pub fn density(&self, [x, y]: [f32; 2]) -> f32 {
+        let ([left, right], [c00, c10, c11, c01]) = (self.ends(y), self.corners);
+        4.0 * ((1.0 - x) * left + x * right) / (c00 + c10 + (c11 + c01))
+    }
+}
+
 /// Sums of the means of neighbours, times `step`: the integral up to each.
 fn cumulative(values: impl Iterator<Item = f64>, step: f64) -> Vec<f64> {
     let mut before = None;
@@ -236,7 +269,7 @@ fn trapezoid([a, b]: [f32; 2], t: f32) -> f32 {
 }
 
 /// The `t` within `[0, 1]` of an integral.
-#[inline]
+#[inline(always)]
 fn solve_trapezoid([a, b]: [f32; 2], integral: f32) -> f32 {
     // Without cancellation, whichever end is higher.
     let root = (a * a + 2.0 * (b - a) * integral).max(0.0).sqrt();
@@ -305,6 +338,33 @@ mod tests {
             };
             let expected: Vec<f64> = (0..BINS * BINS).map(expected).collect();
             assert!((expected.iter().sum::<f64>() / f64::from(count) - 1.0).abs() < 1e-4);
+            let p = chi_squared_p_value(&observed, &expected);
+            assert!(p > 1e-6, "{i}: {p}");
+        }
+    }
+
+    #[test]
+    fn samples_between_four_corners_have_the_density() {
+        const BINS: usize = 16;
+        for (i, corners) in
+            [[1.0; 4], [1.0, 2.0, 0.5, 3.0], [1e9, 2e-5, 1.0, 1e-3], [1e-5, 1e-5, 1e9, 1e-5]].into_iter().enumerate()
+        {
+            let density = BilinearDensity { corners };
+            let mut observed = vec![0; BINS * BINS];
+            let count = 200_000;
+            for [u, v, ..] in random_points(60 + i as u32, count) {
+                let place = density.sample([u, v]);
+                assert!(place.iter().all(|x| (0.0..=1.0).contains(x)) && density.density(place) > 0.0, "{place:?}");
+                let bin = place.map(|x| ((x * BINS as f32) as usize).min(BINS - 1));
+                observed[bin[1] * BINS + bin[0]] += 1;
+            }
+            // The mean of a bilinear function is its value in the middle.
+            let middle = |bin: usize| (bin as f32 + 0.5) / BINS as f32;
+            let expected: Vec<f64> = (0..BINS * BINS)
+                .map(|bin| f64::from(density.density([middle(bin % BINS), middle(bin / BINS)])))
+                .map(|density| density * f64::from(count) / (BINS * BINS) as f64)
+                .collect();
+            assert!((expected.iter().sum::<f64>() / f64::from(count) - 1.0).abs() < 1e-5);
             let p = chi_squared_p_value(&observed, &expected);
             assert!(p > 1e-6, "{i}: {p}");
         }

@@ -11,7 +11,7 @@ mod sampler;
 pub mod statistics;
 pub mod warp;
 
-pub use bilinear::{BilinearTable, BilinearWarp, SliceMix};
+pub use bilinear::{BilinearDensity, BilinearTable, BilinearWarp, SliceMix};
 pub use discrete::{AliasTable, DiscreteSample};
 pub use mis::power_heuristic;
 pub use piecewise::{Piecewise2d, PiecewiseCell, PiecewiseSample};

@@ -121,7 +121,8 @@ pub(super) fn reweigh_light_samples(context: &Context, wave: &mut Wave, block: u
         let [of_photons, of_paths] =
             [Vec3::ZERO, from.n].map(|n| lights.pmf(light, &LightSampleContext { n, ..from }, context.compensation));
         let density_ratio = state.density_ratio * pdf_area * reversed / rows.cos_geometric[lane].abs();
-        let squared_ratio = squared(density_ratio * of_photons / of_paths);
+        let of_point = lights.get(light).side_factor(&from, vertices.points.target_p.get(lane));
+        let squared_ratio = squared(density_ratio * of_photons / (of_paths * of_point));
         let pdf = light_samples.pdf[lane];
         let weight = if light_samples.is_delta[lane] != 0 { 1.0 } else { power_heuristic(pdf, light_evals.pdf[lane]) };
         let factor = emission::share_against(weight, squared_ratio) as f32;

@@ -107,7 +107,7 @@ impl Met<'_> {
             return Some((id, radiance));
         }
         let light_pdf = |from: &LightSampleContext| {
-            light.pdf(&scene.geometry, from.p, ray, at) * scene.lights.pmf(id, from, context.compensation)
+            light.pdf(&scene.geometry, from, ray, at) * scene.lights.pmf(id, from, context.compensation)
         };
         let mut weight = bsdf_mis_weight(context, paths, *i, *caustic, light_pdf);
         if let Some(connection) = connection {
@@ -115,7 +115,7 @@ impl Met<'_> {
             weight = against(weight, connections);
         }
         if let Some(arrival) = departure {
-            let light = light.pdf(&scene.geometry, paths.from(*i).p, ray, at);
+            let light = light.pdf(&scene.geometry, &LightSampleContext::from_any_side(paths.from(*i).p), ray, at);
             weight *= arrival.share(context, id, DirectionPdfs { light, phase: paths.pdf[*i] });
         }
         Some((id, radiance * weight))

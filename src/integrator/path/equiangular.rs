@@ -38,7 +38,7 @@ impl SegmentVertex {
     pub(super) fn share(&self, context: &Context, id: LightId, pdfs: DirectionPdfs) -> f32 {
         let p = self.segment.way.origin + self.segment.way.direction.as_dvec3() * f64::from(self.distance);
         let Some(equiangular_pdf) = equiangular_pdf(context, &self.segment, id, self.distance) else { return 1.0 };
-        let pmf = context.scene.lights.pmf(id, &LightSampleContext { p, n: Vec3::ZERO }, context.compensation);
+        let pmf = context.scene.lights.pmf(id, &LightSampleContext::from_any_side(p), context.compensation);
         let at_vertex = self.segment.pdf(context.world, self.distance) * (pmf * pdfs.light + pdfs.phase);
         power_heuristic(at_vertex, equiangular_pdf * pdfs.light)
     }
@@ -52,7 +52,7 @@ fn equiangular_pdf(context: &Context, segment: &FirstSegment, id: LightId, dista
 
 /// The point for which a light is chosen on a way.
 fn chooser(segment: &FirstSegment) -> LightSampleContext {
-    LightSampleContext { p: segment.way.origin, n: Vec3::ZERO }
+    LightSampleContext::from_any_side(segment.way.origin)
 }
 
 /// Whether distances are chosen for lights.
@@ -89,7 +89,13 @@ pub(super) fn add(context: &Context, wave: &Wave, path: &SegmentPath, segment: &
     let equiangular_pdf = by_angle.pdf(distance) * choice.pmf;
     let direction = segment.way.direction;
     let p = segment.way.origin + direction.as_dvec3() * f64::from(distance);
-    let sample = light.sample(&scene.geometry, &scene.textures, p, [u[0], u[1]], context.compensation);
+    let sample = light.sample(
+        &scene.geometry,
+        &scene.textures,
+        &LightSampleContext::from_any_side(p),
+        [u[0], u[1]],
+        context.compensation,
+    );
     let Some(sample) = sample.filter(|_| equiangular_pdf > 0.0 && distance.is_finite()) else { return 0 };
     let medium = scene.media.get(segment.medium);
     let phase = medium.phase.pdf(-direction, sample.wi);

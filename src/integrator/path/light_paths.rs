@@ -193,7 +193,7 @@ fn light_pdf(context: &Context, vertices: &Vertices, lane: usize, state: &LightP
         time: 0.0,
     };
     let ray = Ray::new(from.p.as_vec3(), -direction);
-    light.pdf(&context.scene.geometry, from.p, &ray, &at) * pmf
+    light.pdf(&context.scene.geometry, &from, &ray, &at) * pmf
 }
 
 /// Scatters a light path: its flux, roulette by what scattering leaves of it, and the sums of other strategies.

@@ -13,7 +13,7 @@ use crate::integrator::{
 };
 use crate::light::{LightSampleContext, ShadowTarget};
 use crate::math::rows::BATCH;
-use crate::math::{Ray, Vec3};
+use crate::math::{DVec3, Ray};
 
 /// Where photons come from.
 pub(super) struct Source<'a> {
@@ -29,6 +29,8 @@ pub(super) struct PhotonState {
     light: LightId,
     /// The density with which the direction to the light was chosen.
     light_pdf: f32,
+    /// The point of the light, or one beyond the scene.
+    target: DVec3,
     /// Where its ray is to arrive first.
     start: CausticPoint,
 }
@@ -108,11 +110,11 @@ fn emitted(context: &Context, source: &Source, index: u32) -> Option<(CameraSamp
     let (scene, sampler, seed) = (context.scene, &context.config.sampler, source.range.seed);
     let [a, b, c, _] = sampler.sample_4d(seed, index, dimensions::CAMERA);
     let start = source.casters.sample(&scene.geometry, [a, b, c]);
-    let from = LightSampleContext { p: start.point.p, n: Vec3::ZERO };
+    let from = LightSampleContext::from_any_side(start.point.p);
     let [a, b, u, v] = sampler.sample_4d(seed, index, dimensions::light(0));
     let choice = scene.lights.choose(&from, [a, b], context.compensation)?;
     let light = scene.lights.get(choice.id);
-    let sample = light.sample(&scene.geometry, &scene.textures, start.point.p, [u, v], context.compensation)?;
+    let sample = light.sample(&scene.geometry, &scene.textures, &from, [u, v], context.compensation)?;
     let cos = sample.wi.dot(start.point.n).abs();
     let light_pdf = choice.pmf * sample.pdf;
     let power = sample.radiance * (cos / (light_pdf * start.pdf_area as f32));
@@ -120,19 +122,20 @@ fn emitted(context: &Context, source: &Source, index: u32) -> Option<(CameraSamp
     if power.is_black() || !power.is_finite() || !density.is_finite() {
         return None;
     }
-    let (shadow_ray, distance) = match sample.target {
-        ShadowTarget::Point(target) => (start.point.ray_to(&target), (target.p - start.point.p).length()),
+    let (shadow_ray, target) = match sample.target {
+        ShadowTarget::Point(target) => (start.point.ray_to(&target), target.p),
         ShadowTarget::Infinity => {
-            (start.point.ray_along(sample.wi), f64::from(context.world.accel.bounds().size().length()))
+            let beyond = f64::from(context.world.accel.bounds().size().length());
+            (start.point.ray_along(sample.wi), start.point.p + sample.wi.as_dvec3() * beyond)
         }
     };
     if context.world.accel.occluded(&shadow_ray) {
         return None;
     }
     // The ray starts half-way, where nothing is in between.
-    let origin = start.point.p + sample.wi.as_dvec3() * (0.5 * distance);
+    let origin = 0.5 * (start.point.p + target);
     let ray = Ray::new(origin.as_vec3(), -sample.wi);
-    let state = PhotonState { density, light: choice.id, light_pdf: sample.pdf, start };
+    let state = PhotonState { density, light: choice.id, light_pdf: sample.pdf, target, start };
     Some((CameraSample { ray, seed, sample: index }, state, power))
 }
 
@@ -214,7 +217,9 @@ fn density_factor(context: &Context, vertices: &Vertices, lane: usize, state: &P
     }
     let met = if is_met { reversed_pdf } else { 0.0 };
     let sampled = if context.bounce == 0 && rows.flags[lane] & vertex_flags::ENCLOSED == 0 {
-        state.light_pdf * lights.pmf(state.light, &vertices.light_context(lane), context.compensation)
+        let from = vertices.light_context(lane);
+        let light_pdf = state.light_pdf * lights.get(state.light).side_factor(&from, state.target);
+        light_pdf * lights.pmf(state.light, &from, context.compensation)
     } else {
         0.0
     };

@@ -4,7 +4,7 @@ use super::tests::{assert_power_flows_out, assert_samples_are_hits, irradiance, 
 use super::*;
 use crate::geometry::{Disk, Frustum, Quad, Sphere};
 use crate::id::LightId;
-use crate::light::{Light, LightContext, LightQueries, LightSet, MisCompensation};
+use crate::light::{Light, LightContext, LightQueries, LightSampleContext, LightSet, MisCompensation};
 use crate::math::rows::{BATCH, DVec3Rows, Vec3Rows};
 use crate::math::{DAffine3, DMat3, Rng, Transform};
 use crate::sampling::SampleRows;
@@ -55,7 +55,9 @@ fn a_placed_sphere_gives_the_closed_form_irradiance() {
     assert!((light.power() / (4.0 * PI * PI * 0.25) - 1.0).abs() < 1e-6);
     assert_samples_are_hits(&geometry, &light, DVec3::ZERO, 1e-4);
     assert_samples_are_hits(&geometry, &light, DVec3::new(1.2, 0.3, 2.2), 1e-4);
-    assert!(light.sample(&geometry, &[], DVec3::new(1.2, 0.1, 1.5), [0.5; 2]).is_none());
+    assert!(
+        light.sample(&geometry, &[], &LightSampleContext::from_any_side(DVec3::new(1.2, 0.1, 1.5)), [0.5; 2]).is_none()
+    );
 }
 
 #[test]
@@ -71,7 +73,7 @@ fn a_sphere_turned_inside_out_lights_its_inside() {
         assert!((e / PI - 1.0).abs() < 1e-3, "{e}");
         assert_samples_are_hits(&geometry, &light, p.into(), 1e-4);
     }
-    assert!(light.sample(&geometry, &[], DVec3::splat(9.0), [0.5; 2]).is_none());
+    assert!(light.sample(&geometry, &[], &LightSampleContext::from_any_side(DVec3::splat(9.0)), [0.5; 2]).is_none());
 }
 
 #[test]
@@ -81,7 +83,9 @@ fn a_quad_light_gives_lamberts_irradiance() {
     let light = light(&geometry, WHITE);
     let e = irradiance(std::slice::from_ref(&light), &geometry, DVec3::ZERO, DVec3::Z);
     assert!((e / 0.718_688_9 - 1.0).abs() < 1e-4, "{e}");
-    assert!(light.sample(&geometry, &[], DVec3::new(0.0, 0.0, 2.0), [0.5; 2]).is_none());
+    assert!(
+        light.sample(&geometry, &[], &LightSampleContext::from_any_side(DVec3::new(0.0, 0.0, 2.0)), [0.5; 2]).is_none()
+    );
 }
 
 #[test]
@@ -158,7 +162,7 @@ fn emitters_sampled_together_have_the_bits_of_those_sampled_alone() {
             },
         );
         for ((i, p, u), found) in vertices.iter().zip(&found) {
-            let alone = lights[*i].sample(&geometry, &[], *p, *u);
+            let alone = lights[*i].sample(&geometry, &[], &LightSampleContext::from_any_side(*p), *u);
             assert_eq!(found.as_ref().map(words), alone.as_ref().map(words), "{i} {p} {u:?}");
             sampled += usize::from(found.is_some());
         }

@@ -81,11 +81,11 @@ impl EmitterQueue {
                 rows.sample(light, context.geometry, group.len())
             };
             for (i, lane) in group.iter().map(|&lane| usize::from(lane)).enumerate() {
-                let (p, u) = queries.get(lane);
+                let (_, u) = queries.get(lane);
                 let sample = if is_in_rows {
                     sample_of_row(light, &rows.views, i)
                 } else {
-                    light.sample(context.geometry, context.textures, p, u)
+                    light.sample(context.geometry, context.textures, &queries.light_context(lane), u)
                 };
                 if let Some(sample) = sample {
                     set(lane, &sample);

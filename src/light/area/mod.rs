@@ -20,7 +20,7 @@ use triangle::triangle_error;
 pub(crate) use triangle::triangle_point;
 
 use super::bounds::{EmissionCone, LightBounds, to_positive};
-use super::{LightSample, ShadowTarget};
+use super::{LightSample, LightSampleContext, ShadowTarget};
 use crate::color::Rgb;
 use crate::geometry::{Analytic, Geometry, Mesh, Shape, SpawnPoint, SurfaceInteraction, TransformedShape};
 use crate::id::{PrimId, ShapeId, TextureId};
@@ -79,8 +79,8 @@ impl Emission {
 /// An emissive analytic shape, one triangle of an emissive mesh, or a mesh of two triangles that make up a
 /// parallelogram.
 ///
-/// Whole spheres that are scaled evenly and rectangles are sampled by the solid angle they fill; everything else by
-/// area. Quads with a texture or with holes are sampled by their brightness in half of the cases.
+/// Whole spheres that are scaled evenly and near rectangles are sampled by the solid angle they fill; everything else
+/// by area. Quads with a texture or with holes are sampled by their brightness in half of the cases.
 #[derive(Clone, Debug)]
 pub struct AreaLight {
     /// The shape.
@@ -206,36 +206,54 @@ impl AreaLight {
         if self.emission.two_sided || at.n_g.dot(wo) > 0.0 { self.emission.at(textures, point) } else { Rgb::BLACK }
     }
 
-    /// Light that arrives at `p` from a chosen point of the surface; `None` where `p` sees the dark side.
+    /// Light that arrives from a chosen point of the surface; `None` where the dark side is seen.
     #[inline]
-    pub fn sample(&self, geometry: &Geometry, textures: &[Texture], p: DVec3, u: [f32; 2]) -> Option<LightSample> {
+    pub fn sample(
+        &self,
+        geometry: &Geometry,
+        textures: &[Texture],
+        from: &LightSampleContext,
+        u: [f32; 2],
+    ) -> Option<LightSample> {
         if !self.emission.is_even() {
-            return self.sample_textured(geometry, textures, p, u);
+            return self.sample_textured(geometry, textures, from, u);
         }
-        let (sample, error) = self.sample_surface(geometry, p, u)?;
+        let (sample, error) = self.sample_surface(geometry, from, u)?;
         Some(sample.with_radiance(self.emission.radiance, error))
     }
 
     /// [`sample`](Self::sample) for emission with a texture or holes.
     #[inline(never)]
-    fn sample_textured(&self, geometry: &Geometry, textures: &[Texture], p: DVec3, u: [f32; 2]) -> Option<LightSample> {
+    fn sample_textured(
+        &self,
+        geometry: &Geometry,
+        textures: &[Texture],
+        from: &LightSampleContext,
+        u: [f32; 2],
+    ) -> Option<LightSample> {
         let (sample, error) = match &self.form {
-            EmitterShape::Parallelogram(quad) => (quad.sample_textured(p, u, self.emission.two_sided)?, quad.error),
-            _ => self.sample_surface(geometry, p, u)?,
+            EmitterShape::Parallelogram(quad) => (quad.sample_textured(from, u, self.emission.two_sided)?, quad.error),
+            _ => self.sample_surface(geometry, from, u)?,
         };
         let radiance =
             self.emission.expected(textures, &textured::point(geometry.shape(self.shape), self.prim, sample.p, u));
         Some(sample.with_radiance(radiance, error))
     }
 
-    /// A point of the surface, chosen without regard to a texture, and the error of its position; `None` where `p` sees
-    /// the dark side.
+    /// A point of the surface, chosen without regard to a texture, and the error of its position; `None` where the
+    /// dark side is seen.
     #[inline(always)]
-    fn sample_surface(&self, geometry: &Geometry, p: DVec3, u: [f32; 2]) -> Option<(EmitterSample, f32)> {
+    fn sample_surface(
+        &self,
+        geometry: &Geometry,
+        from: &LightSampleContext,
+        u: [f32; 2],
+    ) -> Option<(EmitterSample, f32)> {
+        let p = from.p;
         let both = self.emission.two_sided;
         Some(match &self.form {
             EmitterShape::Sphere(sphere) if both || sphere.sees_front(p) => (sphere.sample(p, u)?, 0.0),
-            EmitterShape::Parallelogram(quad) => (quad.sample(p, u, both)?, quad.error),
+            EmitterShape::Parallelogram(quad) => (quad.sample(from, u, both)?, quad.error),
             EmitterShape::Triangle { .. } => self.sample_triangle(geometry, p, u)?,
             EmitterShape::TransformedShape { .. } => {
                 let Shape::Analytic(placed) = geometry.shape(self.shape) else { return None };
@@ -276,24 +294,33 @@ impl AreaLight {
         }
     }
 
-    /// Density per solid angle with which [`sample`](Self::sample) from `p` would have chosen the direction of `ray`
-    /// (unit), which starts at `p` and hit this light at `at`; zero on the dark side.
+    /// Density per solid angle with which [`sample`](Self::sample) would have chosen the direction of `ray` (unit),
+    /// which starts at the same point and hit this light at `at`; zero on the dark side.
     #[inline]
-    pub fn pdf(&self, geometry: &Geometry, p: DVec3, ray: &Ray, at: &SurfaceInteraction) -> f32 {
+    pub fn pdf(&self, geometry: &Geometry, from: &LightSampleContext, ray: &Ray, at: &SurfaceInteraction) -> f32 {
         if !self.emission.two_sided && at.n_g.dot(ray.direction) >= 0.0 {
             return 0.0;
         }
         match &self.form {
-            EmitterShape::Sphere(sphere) => sphere.pdf(p, at.p),
-            EmitterShape::Parallelogram(quad) => quad.pdf(p, at.p),
-            EmitterShape::Triangle { area } => EmitterSample::pdf_from_area(p, at.p, at.n_g.as_dvec3(), 1.0 / area),
+            EmitterShape::Sphere(sphere) => sphere.pdf(from.p, at.p),
+            EmitterShape::Parallelogram(quad) => quad.pdf(from, at.p),
+            EmitterShape::Triangle { area } => {
+                EmitterSample::pdf_from_area(from.p, at.p, at.n_g.as_dvec3(), 1.0 / area)
+            }
             EmitterShape::TransformedShape { .. } => {
                 let Shape::Analytic(placed) = geometry.shape(self.shape) else { return 0.0 };
                 // Where the normal does not determine the density, the hit itself does.
                 let pdf_area = placed.pdf_area_from_normal(at.n_g).or_else(|| placed.pdf_area(ray));
-                pdf_area.map_or(0.0, |pdf_area| EmitterSample::pdf_from_area(p, at.p, at.n_g.as_dvec3(), pdf_area))
+                pdf_area.map_or(0.0, |pdf_area| EmitterSample::pdf_from_area(from.p, at.p, at.n_g.as_dvec3(), pdf_area))
             }
         }
+    }
+
+    /// The density with which the point `q` is [sampled](Self::sample), over that for light from any side.
+    pub fn side_factor(&self, from: &LightSampleContext, q: DVec3) -> f32 {
+        let EmitterShape::Parallelogram(quad) = &self.form else { return 1.0 };
+        let of_any_side = quad.pdf(&LightSampleContext::from_any_side(from.p), q);
+        if of_any_side > 0.0 { quad.pdf(from, q) / of_any_side } else { 1.0 }
     }
 
     /// Area of the surface, in the world.

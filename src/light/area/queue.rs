@@ -8,7 +8,6 @@ use crate::light::{LightQueries, LightSampleRows, light_target};
 use crate::math::DVec3;
 use crate::math::rows::{BATCH, DVec3Rows, Element, Row, pair, soa, whole_vectors};
 use crate::math::vectorize::vectorize;
-use crate::sampling::SampleRows;
 
 soa! {
     /// Points of lights as seen from vertices.
@@ -156,7 +155,7 @@ impl AreaQueue {
             samples.target = [light_target::NONE; BATCH];
             return;
         }
-        vectorize!(sample_by_area(shapes, emissions, queries.points, queries.u, views, target_p, queries.count));
+        vectorize!(sample_by_area(shapes, emissions, queries, views, target_p));
         near.sample(shapes, queries, views, target_p);
         vectorize!(set_samples(shapes, emissions, views, pmfs, samples, queries.count));
     }
@@ -166,15 +165,14 @@ impl AreaQueue {
 fn sample_by_area(
     shapes: &ParallelogramRows,
     emissions: &EmissionRows,
-    points: &DVec3Rows,
-    u: &SampleRows,
+    queries: &LightQueries,
     views: &mut ViewRows,
     target_p: &mut DVec3Rows,
-    count: usize,
 ) {
-    for i in 0..whole_vectors(count) {
-        let [_, s, t, _] = u.of(i);
-        let (sample, is_near) = shapes.get(i).sample_by_area(points.get(i), [s, t], emissions.two_sided[i] != 0);
+    for i in 0..whole_vectors(queries.count) {
+        let [_, s, t, _] = queries.u.of(i);
+        let (sample, is_near) =
+            shapes.get(i).sample_by_area(&queries.light_context(i), [s, t], emissions.two_sided[i] != 0);
         target_p.set(i, sample.q);
         views.wi.set(i, sample.wi);
         views.pdf[i] = sample.pdf;

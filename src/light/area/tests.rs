@@ -3,7 +3,7 @@ use std::f64::consts::{PI, TAU};
 use super::*;
 use crate::id::LightId;
 use crate::light::test_support::assert_chi_squared;
-use crate::light::{LightQueries, LightSampleRows, light_target};
+use crate::light::{LightQueries, LightSampleContext, LightSampleRows, light_target};
 use crate::math::Rng;
 use crate::math::rows::{BATCH, DVec3Rows, Vec3Rows};
 use crate::sampling::SampleRows;
@@ -27,7 +27,7 @@ pub(super) fn irradiance(lights: &[AreaLight], geometry: &Geometry, p: DVec3, n:
     for light in lights {
         for i in 0..grid * grid {
             let u = [((i % grid) as f32 + 0.5) / grid as f32, ((i / grid) as f32 + 0.5) / grid as f32];
-            if let Some(s) = light.sample(geometry, &[], p, u) {
+            if let Some(s) = light.sample(geometry, &[], &LightSampleContext { p, n: n.as_vec3() }, u) {
                 sum += f64::from(s.radiance.g) * n.dot(s.wi.as_dvec3()).max(0.0) / f64::from(s.pdf);
             }
         }
@@ -38,10 +38,12 @@ pub(super) fn irradiance(lights: &[AreaLight], geometry: &Geometry, p: DVec3, n:
 /// Asserts that shadow targets lie on the light and that its hits have the density of the samples.
 pub(super) fn assert_samples_are_hits(geometry: &Geometry, light: &AreaLight, p: DVec3, tolerance: f32) {
     let mut random = Rng::new(7);
-    let (mut hits, n) = (0, 2000);
+    let (mut hits, count) = (0, 2000u32);
     let p = p.as_vec3().as_dvec3();
-    for _ in 0..n {
-        let Some(s) = light.sample(geometry, &[], p, random.pair()) else { continue };
+    for i in 0..count {
+        let n = if i.is_multiple_of(2) { Vec3::ZERO } else { random.direction().as_vec3().normalize() };
+        let from = LightSampleContext { p, n };
+        let Some(s) = light.sample(geometry, &[], &from, random.pair()) else { continue };
         let ray = Ray::new(p.as_vec3(), s.wi);
         let shape = geometry.shape(light.shape);
         // Curved shapes may be met earlier than at the sample: it is then shadowed, or the hit is another point.
@@ -59,11 +61,14 @@ pub(super) fn assert_samples_are_hits(geometry: &Geometry, light: &AreaLight, p:
             continue;
         }
         hits += 1;
-        let pdf = light.pdf(geometry, p, &ray, &at);
+        let pdf = light.pdf(geometry, &from, &ray, &at);
+        let factor = light.side_factor(&from, target.p);
+        let of_any_side = light.pdf(geometry, &LightSampleContext::from_any_side(p), &ray, &at);
+        assert!((factor * of_any_side - pdf).abs() <= tolerance * pdf);
         assert!((pdf - s.pdf).abs() <= tolerance * s.pdf, "{pdf} {} at {:?}", s.pdf, at.p);
         assert_eq!(light.radiance(geometry, &[], &at, -s.wi), s.radiance);
     }
-    assert!(hits > n / 20, "{hits}");
+    assert!(hits > count / 20, "{hits}");
 }
 
 /// Asserts that what flows through a sphere around a light is its power.
@@ -79,7 +84,9 @@ pub(super) fn assert_power_flows_out(
     let mut sum = 0.0;
     for _ in 0..n {
         let outward = random.direction();
-        if let Some(s) = light.sample(geometry, &[], center + outward * radius, random.pair()) {
+        if let Some(s) =
+            light.sample(geometry, &[], &LightSampleContext::from_any_side(center + outward * radius), random.pair())
+        {
             sum += f64::from(s.radiance.luminance()) * -outward.dot(s.wi.as_dvec3()) / f64::from(s.pdf);
         }
     }
@@ -138,10 +145,12 @@ fn a_rectangle_light_gives_lamberts_irradiance() {
         let e = irradiance(lights, &geometry, DVec3::ZERO, DVec3::Z);
         assert!((e / 0.718_688_9 - 1.0).abs() < 1e-4, "{e}");
     }
-    assert!(one[0].sample(&geometry, &[], DVec3::new(0.0, 0.0, 1.5), [0.5; 2]).is_none());
-    assert!(one[0].sample(&geometry, &[], DVec3::new(3.0, 0.0, 1.0), [0.5; 2]).is_none());
+    let from_any_side = |z: f64| LightSampleContext::from_any_side(DVec3::Z * z);
+    assert!(one[0].sample(&geometry, &[], &from_any_side(1.5), [0.5; 2]).is_none());
+    let edge_on = LightSampleContext::from_any_side(DVec3::new(3.0, 0.0, 1.0));
+    assert!(one[0].sample(&geometry, &[], &edge_on, [0.5; 2]).is_none());
     let both = AreaLight { emission: Emission { two_sided: true, ..WHITE }, ..one[0].clone() };
-    assert!(both.sample(&geometry, &[], DVec3::new(0.0, 0.0, 1.5), [0.5; 2]).is_some());
+    assert!(both.sample(&geometry, &[], &from_any_side(1.5), [0.5; 2]).is_some());
     assert_eq!(both.power(), 2.0 * one[0].power());
 }
 
@@ -178,9 +187,12 @@ fn queued_samples_have_the_bits_of_single_ones() {
     lights.extend(AreaLight::for_shape(ShapeId(0), WHITE, &skewed, &[]));
     let mut random = Rng::new(13);
     let mut queue = AreaQueue::default();
-    let mut points = DVec3Rows::ZERO;
+    let (mut points, mut normals) = (DVec3Rows::ZERO, Vec3Rows::ZERO);
     for count in [1, 16, 100, BATCH] {
         queue.clear();
+        let mut normal =
+            |i: usize| if i.is_multiple_of(3) { Vec3::ZERO } else { random.direction().as_vec3().normalize() };
+        let normal_of: Vec<_> = (0..count).map(&mut normal).collect();
         let vertices: Vec<_> =
             (0..count).map(|_| (random.below(lights.len()), random.cube() * 3.0, random.pair())).collect();
         let numbers = SampleRows::new(&vertices.iter().map(|(_, _, [u, v])| [0.0, *u, *v, 0.0]).collect::<Vec<_>>());
@@ -188,11 +200,12 @@ fn queued_samples_have_the_bits_of_single_ones() {
         let is_queued = |lane: usize| lane % 8 != 3;
         for (lane, (i, p, _)) in vertices.iter().enumerate() {
             points.set(lane, *p);
+            normals.set(lane, normal_of[lane]);
             assert!(!is_queued(lane) || queue.push(&lights[*i], LightId::new(*i), lane));
         }
         let (mut samples, mut target_p) = (LightSampleRows::default(), DVec3Rows::ZERO);
         queue.sample(
-            &LightQueries { count, points: &points, normals: &Vec3Rows::ZERO, u: &numbers },
+            &LightQueries { count, points: &points, normals: &normals, u: &numbers },
             &[0.5; BATCH],
             &mut samples,
             &mut target_p,
@@ -211,7 +224,7 @@ fn queued_samples_have_the_bits_of_single_ones() {
                     normal_and_error.1,
                 )
             });
-            let alone = lights[*i].sample(&geometry, &[], *p, *u);
+            let alone = lights[*i].sample(&geometry, &[], &LightSampleContext { p: *p, n: normal_of[lane] }, *u);
             assert_eq!(found, alone.as_ref().map(words).filter(|_| is_queued(lane)), "{i} {p} {u:?}");
             sampled += usize::from(found.is_some());
         }
@@ -254,7 +267,10 @@ fn triangles_without_area_give_no_light() {
     let geometry = scene(&[[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], &[[0, 1, 2], [0, 0, 1]]);
     for light in AreaLight::for_shape(ShapeId(0), WHITE, &geometry, &[]) {
         let both = AreaLight { emission: Emission { two_sided: true, ..WHITE }, ..light };
-        assert!(both.sample(&geometry, &[], DVec3::new(0.3, 0.2, 1.0), [0.3, 0.6]).is_none());
+        assert!(
+            both.sample(&geometry, &[], &LightSampleContext::from_any_side(DVec3::new(0.3, 0.2, 1.0)), [0.3, 0.6])
+                .is_none()
+        );
         assert_eq!(both.power(), 0.0);
     }
 }
@@ -271,7 +287,7 @@ fn a_point_almost_in_a_rectangle_sees_it_evenly() {
             let p = DVec3::new(x, y, height);
             let (mut counts, mut random) = (vec![0u32; 256], Rng::new(3));
             for _ in 0..30_000 {
-                let s = quad.sample(p, random.pair(), true).unwrap();
+                let s = quad.sample(&LightSampleContext::from_any_side(p), random.pair(), true).unwrap();
                 assert!((f64::from(s.pdf) * (to - from) - 1.0).abs() < 1e-4);
                 let d = (s.p - p).normalize();
                 let (i, j) = ((-d.z * 16.0) as usize, ((d.y.atan2(d.x) - from) / (to - from) * 16.0) as usize);

@@ -36,6 +36,13 @@ pub struct LightSampleContext {
     pub n: Vec3,
 }
 
+impl LightSampleContext {
+    /// Light that may come from either side.
+    pub fn from_any_side(p: DVec3) -> Self {
+        Self { p, n: Vec3::ZERO }
+    }
+}
+
 /// A light chosen by the tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct TreeChoice {

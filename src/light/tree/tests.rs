@@ -98,7 +98,7 @@ fn whatever_can_shine_somewhere_can_be_chosen_there() {
         for (light, pmf) in set.lights().iter().zip(pmfs(&set, &from)) {
             let mut arrives = false;
             for _ in 0..16 {
-                let Some(s) = light.sample(&geometry, &[], from.p, random.pair(), MisCompensation::Off) else {
+                let Some(s) = light.sample(&geometry, &[], &from, random.pair(), MisCompensation::Off) else {
                     continue;
                 };
                 arrives |= s.radiance.luminance() > 0.0 && (from.n == Vec3::ZERO || s.wi.dot(from.n) > 0.0);

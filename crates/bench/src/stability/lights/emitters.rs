@@ -7,7 +7,7 @@ use crate::geometry::{
     Analytic, Disk, Frustum, Geometry, Profile, Quad, Revolution, Shape, Sphere, SurfaceInteraction,
 };
 use crate::id::{PrimId, ShapeId};
-use crate::light::AreaLight;
+use crate::light::{AreaLight, LightSampleContext};
 use crate::math::float::step_past;
 use crate::math::{DVec3, Ray, Rng};
 use crate::stability::geometry::{meshes, triangle};
@@ -154,12 +154,13 @@ impl View<'_> {
             let sin = (1.0 - cos * cos).sqrt();
             for (ray, at) in self.hits(x * (sin * c) + y * (sin * s) + axis * cos) {
                 if at.n_g.dot(ray.direction).abs() > EDGE_ON {
-                    sum += f64::from(self.light.pdf(self.geometry, self.p, &ray, &at));
+                    sum +=
+                        f64::from(self.light.pdf(self.geometry, &LightSampleContext::from_any_side(self.p), &ray, &at));
                 }
             }
             let u = [(i % n) as f32 + rng.unit_f32(), (i / n) as f32 + rng.unit_f32()]
                 .map(|u| (u / n as f32).min(1.0 - f32::EPSILON));
-            if let Some(s) = self.light.sample(self.geometry, &[], self.p, u)
+            if let Some(s) = self.light.sample(self.geometry, &[], &LightSampleContext::from_any_side(self.p), u)
                 && let crate::light::ShadowTarget::Point(target) = &s.target
             {
                 share += u32::from(target.n.dot(s.wi).abs() > EDGE_ON);
@@ -173,14 +174,17 @@ impl View<'_> {
     fn densities(&self, count: u32, rng: &mut Rng) -> (f64, usize) {
         let (mut worst, mut compared) = (0f64, 0);
         for _ in 0..count {
-            let Some(s) = self.light.sample(self.geometry, &[], self.p, rng.pair()) else { continue };
+            let Some(s) = self.light.sample(self.geometry, &[], &LightSampleContext::from_any_side(self.p), rng.pair())
+            else {
+                continue;
+            };
             let distance = (target(&s) - self.p).length();
             for (ray, at) in self.hits(s.wi.as_dvec3()) {
                 // The rounding of the direction moves the point by distance / cos, and the cosine on a curved surface
                 // by as much.
                 let cos = f64::from(at.n_g.dot(s.wi));
                 if (at.p - target(&s)).length() <= 1e-5 * distance && cos * cos >= 4e-3 * distance {
-                    let pdf = self.light.pdf(self.geometry, self.p, &ray, &at);
+                    let pdf = self.light.pdf(self.geometry, &LightSampleContext::from_any_side(self.p), &ray, &at);
                     worst = worst.max((f64::from(pdf) / f64::from(s.pdf) - 1.0).abs());
                     compared += 1;
                 }
@@ -202,7 +206,10 @@ fn clips(emitter: &Emitter, view: &View, count: u32, rng: &mut Rng) -> (f64, Vec
     }
     // Not every point of a light is a sample where it is seen edge-on; those that are lie within the clips too.
     for _ in 0..count / 10 {
-        let Some(s) = view.light.sample(view.geometry, &[], view.p, rng.pair()) else { continue };
+        let Some(s) = view.light.sample(view.geometry, &[], &LightSampleContext::from_any_side(view.p), rng.pair())
+        else {
+            continue;
+        };
         outside = outside.max((emitter.outside)(placed.transform.inverse_point(target(&s))));
     }
     (outside, counts)

@@ -2,7 +2,7 @@
 
 use super::{Effort, Outcome, TWO_SIDED, Tests, first_light, grid, place, target, transform};
 use crate::geometry::{Analytic, Quad};
-use crate::light::AreaLight;
+use crate::light::{AreaLight, LightSampleContext};
 use crate::math::{DMat3, DVec3, Rng};
 use crate::stability::geometry::{meshes, triangle};
 use crate::{geometry::Geometry, id::ShapeId};
@@ -42,7 +42,7 @@ pub(in crate::stability) fn lambert(corners: &[DVec3], n: DVec3) -> f64 {
 /// Means over a grid of samples: the inverse density, and the irradiance of radiance 1.
 fn means(geometry: &Geometry, light: &AreaLight, p: DVec3, n: DVec3, side: u32) -> [f64; 2] {
     let mut sums = [0.0; 2];
-    for s in grid(side).filter_map(|u| light.sample(geometry, &[], p, u)) {
+    for s in grid(side).filter_map(|u| light.sample(geometry, &[], &LightSampleContext::from_any_side(p), u)) {
         sums[0] += 1.0 / f64::from(s.pdf);
         sums[1] += n.dot(s.wi.as_dvec3()).max(0.0) / f64::from(s.pdf);
     }
@@ -51,7 +51,8 @@ fn means(geometry: &Geometry, light: &AreaLight, p: DVec3, n: DVec3, side: u32) 
 
 /// Whether all points of a light are chosen with the same density, as they are by solid angle.
 fn has_one_density(geometry: &Geometry, light: &AreaLight, p: DVec3) -> bool {
-    let mut densities = grid(8).filter_map(|u| light.sample(geometry, &[], p, u)).map(|s| s.pdf);
+    let mut densities =
+        grid(8).filter_map(|u| light.sample(geometry, &[], &LightSampleContext::from_any_side(p), u)).map(|s| s.pdf);
     let first = densities.next();
     densities.all(|pdf| Some(pdf) == first)
 }
@@ -111,7 +112,9 @@ pub(super) fn l6_polygons(effort: Effort) -> Outcome {
         let n = effort.pick(30_000, 3_000_000);
         let mut counts = vec![0u32; CELLS * CELLS];
         for _ in 0..n {
-            let Some(s) = light.sample(&geometry, &[], p, rng.pair()) else { continue };
+            let Some(s) = light.sample(&geometry, &[], &LightSampleContext::from_any_side(p), rng.pair()) else {
+                continue;
+            };
             if by_solid_angle {
                 densities = densities.max((f64::from(s.pdf) * whole - 1.0).abs());
             }

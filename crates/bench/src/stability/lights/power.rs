@@ -7,7 +7,8 @@ use super::{Effort, Outcome, TWO_SIDED, WHITE, first_light, place, quasi_random,
 use crate::color::Rgb;
 use crate::geometry::{Analytic, Geometry, Profile, Revolution};
 use crate::light::{
-    DirectionalLight, Environment, EnvironmentMap, IesLight, IesProfile, Light, MisCompensation, PointLight, SpotLight,
+    DirectionalLight, Environment, EnvironmentMap, IesLight, IesProfile, Light, LightSampleContext, MisCompensation,
+    PointLight, SpotLight,
 };
 use crate::math::{DMat3, DVec3};
 use crate::stability::geometry::{all_analytic_shapes, meshes, triangle};
@@ -40,7 +41,13 @@ fn flux(lamp: &Lamp, count: u32) -> f64 {
     for [a, b, c, d] in quasi_random(count) {
         let outward = direction([a, b]);
         let p = CENTER + outward * REACH;
-        let Some(s) = lamp.light.sample(&lamp.geometry, &[], p, [c as f32, d as f32], MisCompensation::Off) else {
+        let Some(s) = lamp.light.sample(
+            &lamp.geometry,
+            &[],
+            &LightSampleContext::from_any_side(p),
+            [c as f32, d as f32],
+            MisCompensation::Off,
+        ) else {
             continue;
         };
         let cos = outward.dot(s.wi.as_dvec3());

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use super::{Effort, Faults, Outcome, TWO_SIDED, Tests, first_light, grid, place, target, transform};
 use crate::geometry::{Analytic, Geometry, Sphere};
 use crate::id::{PrimId, ShapeId};
-use crate::light::AreaLight;
+use crate::light::{AreaLight, LightSampleContext};
 use crate::math::{DMat3, DVec3, Ray, Rng};
 use crate::stability::Plot;
 
@@ -35,7 +35,10 @@ pub(super) fn l2_solid_angles(effort: Effort) -> Outcome {
     let (geometry, light) = lamp(RADIUS);
     let mean = |d: f64, n: u32| {
         let p = CENTER + ASIDE * (d * RADIUS);
-        let sum: f64 = grid(n).filter_map(|u| light.sample(&geometry, &[], p, u)).map(|s| 1.0 / f64::from(s.pdf)).sum();
+        let sum: f64 = grid(n)
+            .filter_map(|u| light.sample(&geometry, &[], &LightSampleContext::from_any_side(p), u))
+            .map(|s| 1.0 / f64::from(s.pdf))
+            .sum();
         sum / f64::from(n * n)
     };
     // One density for all directions: a few samples give it.
@@ -72,7 +75,9 @@ pub(super) fn l3_far_spheres(effort: Effort) -> Outcome {
             let p = CENTER + ASIDE * (d * radius);
             // The centre's coordinates round: at a height of 1e-4 radii that is what the distance can be known to.
             let d = (p - CENTER).length() / radius;
-            let Some(s) = light.sample(&geometry, &[], p, [0.4, 0.3]) else { return Outcome::new() };
+            let Some(s) = light.sample(&geometry, &[], &LightSampleContext::from_any_side(p), [0.4, 0.3]) else {
+                return Outcome::new();
+            };
             let error = (f64::from(s.pdf) * solid_angle(d) - 1.0).abs();
             samples = samples.max(error);
             if radius == RADIUS {
@@ -83,7 +88,11 @@ pub(super) fn l3_far_spheres(effort: Effort) -> Outcome {
             let ray = Ray::new(p.as_vec3(), s.wi);
             let Some(hit) = geometry.shape(ShapeId(0)).intersect_prim(&ray, ShapeId(0), PrimId(0)) else { continue };
             let Some(at) = geometry.interaction(&ray, &hit) else { continue };
-            hits = hits.max((f64::from(light.pdf(&geometry, p, &ray, &at)) * solid_angle(d) - 1.0).abs());
+            hits = hits.max(
+                (f64::from(light.pdf(&geometry, &LightSampleContext::from_any_side(p), &ray, &at)) * solid_angle(d)
+                    - 1.0)
+                    .abs(),
+            );
         }
     }
     let plot = Plot {
@@ -109,7 +118,7 @@ pub(super) fn l4_directions(effort: Effort) -> Outcome {
         let axis = (CENTER - p) / distance;
         let one_minus_cos_max = solid_angle(distance / RADIUS) / TAU;
         for u in grid(10) {
-            let Some(s) = light.sample(&geometry, &[], p, u) else {
+            let Some(s) = light.sample(&geometry, &[], &LightSampleContext::from_any_side(p), u) else {
                 lost.require(false, || format!("no sample at {p} for {u:?}"));
                 continue;
             };
@@ -137,7 +146,9 @@ pub(super) fn l4_directions(effort: Effort) -> Outcome {
         let one_minus_cos_max = solid_angle(d) / TAU;
         let (mut counts, mut rng, n) = (vec![0u32; 256], Rng::new(1), effort.pick(100_000, 3_000_000));
         for _ in 0..n {
-            let Some(s) = light.sample(&geometry, &[], p, rng.pair()) else { continue };
+            let Some(s) = light.sample(&geometry, &[], &LightSampleContext::from_any_side(p), rng.pair()) else {
+                continue;
+            };
             let w = (target(&s) - p).normalize();
             let i = (0.5 * (w - axis).length_squared() / one_minus_cos_max * 16.0) as usize;
             let j = ((w.dot(y).atan2(w.dot(x)) / TAU + 1.0).fract() * 16.0) as usize;

@@ -8,7 +8,7 @@ use crate::geometry::{
     Analytic, Disk, Frustum, Geometry, Mesh, Profile, Quad, Revolution, Shape, Sphere, TransformedShape,
 };
 use crate::id::{PrimId, ShapeId};
-use crate::light::{AreaLight, Emission, ShadowTarget};
+use crate::light::{AreaLight, Emission, LightSampleContext, ShadowTarget};
 use crate::math::{DAffine3, DVec3, Transform};
 use crate::stability::geometry::{Rng, grid, mesh, triangle, world};
 
@@ -95,7 +95,10 @@ fn shadow_rays(rng: &mut Rng, emitter: &Shape, distance: f64, count: usize, tall
             if si.shape != ShapeId(0) {
                 continue;
             }
-            let Some(sample) = light.sample(&room.geometry, &[], si.p, rng.pair()) else { continue };
+            let Some(sample) = light.sample(&room.geometry, &[], &LightSampleContext::from_any_side(si.p), rng.pair())
+            else {
+                continue;
+            };
             // The floor is lit from above.
             if f64::from(sample.wi.dot(si.n_g)) * si.n_g.as_dvec3().dot(room.n) < 1e-6 {
                 continue;
