@@ -118,7 +118,7 @@ FEATURES = {
             ("src/light/set.rs", r"match &self\.mis_compensated \{", "match &None::<LightDistribution> {"),
         ],
     ),
-    "light tree": ("`LightSet::selection`", [("src/light/set.rs", r"(?<=if let Some\(tree\) = )&self\.tree|(?<=match )&self\.tree", "&None::<Box<LightTree>>")]),
+    "light tree": ("`LightSet::selection`", [("src/light/set.rs", r"(?<=if let Some\(tree\) = )&self\.tree|(?<=match )&self\.tree|(?<=match \()&self\.tree", "&None::<Box<LightTree>>")]),
     "media": ("`Features::media`", [flag("media")]),
     "anisotropy": ("`Features::anisotropic`, `Features::parameters`", [flag("anisotropic"), flag("parameters")]),
     "layers beside the colour": (

@@ -7,6 +7,8 @@ use crate::bytes::{ByteReader, ByteWriter};
 use crate::color::Rgb;
 
 /// Sums over groups of each pixel's samples, of their means and the squares of these.
+///
+/// Means are [`rounded`] to 16 bits, so that sums of squares are as exact as those of the means.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct SampleMoments {
     /// Number of groups, by pixel.
@@ -26,6 +28,7 @@ impl SampleMoments {
     #[inline]
     pub fn add(&mut self, pixel: usize, mean: [f64; 3]) {
         self.groups[pixel] += 1;
+        let mean = mean.map(rounded);
         self.sums.add(pixel, mean);
         self.squares.add(pixel, mean.map(|value| value * value));
     }
@@ -33,6 +36,7 @@ impl SampleMoments {
     /// Adds groups, at most one of each pixel, by pixel and mean.
     pub fn add_all(&mut self, buffer: &mut Vec<f64>, means: impl ExactSizeIterator<Item = (usize, [f64; 3])> + Clone) {
         means.clone().for_each(|(pixel, _)| self.groups[pixel] += 1);
+        let means = means.map(|(pixel, mean)| (pixel, mean.map(rounded)));
         self.sums.add_all(buffer, means.clone());
         self.squares.add_all(buffer, means.map(|(pixel, mean)| (pixel, mean.map(|value| value * value))));
     }
@@ -42,6 +46,14 @@ impl SampleMoments {
         self.sums.merge(&other.sums, 1.0);
         self.squares.merge(&other.squares, 1.0);
     }
+}
+
+/// To 16 bits: squares then have 32, and 2^17 of them are summed exactly as long as the sum is less than 2^28 times the
+/// smallest. What rounding adds to a variance is below 1e-10 of the squared mean.
+#[inline(always)]
+fn rounded(value: f64) -> f64 {
+    const DROPPED: u32 = 52 - 15;
+    f64::from_bits((value.to_bits() + (1 << (DROPPED - 1))) & (u64::MAX << DROPPED))
 }
 
 /// What is summed of a sample.

@@ -26,7 +26,6 @@ const EXCEPTIONS: &[(Rule, &str, &str, &str)] = &[
     (Rule::Parameters, "src/geometry/placed/points.rs", "resolve_on", ROWS),
     (Rule::Parameters, "src/integrator/path/direct.rs", "illuminate", ROWS),
     (Rule::Parameters, "src/integrator/path/scatter.rs", "spawn_rays", ROWS),
-    (Rule::Parameters, "src/light/area/queue.rs", "sample_by_area", ROWS),
     (Rule::Parameters, "src/light/area/queue.rs", "set_samples", ROWS),
 ];
 

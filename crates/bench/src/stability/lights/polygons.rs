@@ -3,12 +3,18 @@
 use super::{Effort, Outcome, TWO_SIDED, Tests, first_light, grid, place, target, transform};
 use crate::geometry::{Analytic, Quad};
 use crate::light::{AreaLight, LightSampleContext};
-use crate::math::{DMat3, DVec3, Rng};
+use crate::math::{DMat3, DVec3, Ray, Rng};
 use crate::stability::geometry::{meshes, triangle};
-use crate::{geometry::Geometry, id::ShapeId};
+use crate::{
+    geometry::Geometry,
+    id::{PrimId, ShapeId},
+};
 
 /// Cells of a rectangle along each side.
 const CELLS: usize = 12;
+
+/// Parts of a cell along each side, over which a density is averaged.
+const PARTS: usize = 8;
 
 /// The rectangle from `corner` along `u` and `v` as a light.
 fn quad_light(corner: DVec3, u: DVec3, v: DVec3) -> (Geometry, AreaLight) {
@@ -37,6 +43,14 @@ pub(in crate::stability) fn lambert(corners: &[DVec3], n: DVec3) -> f64 {
     let around = corners.iter().zip(corners.iter().cycle().skip(1));
     let sum: f64 = around.map(|(a, b)| a.angle_between(*b) * n.dot(a.cross(*b).normalize())).sum();
     (0.5 * sum).abs()
+}
+
+/// Density per solid angle of the point `q` of a light as seen from `p`.
+fn density(geometry: &Geometry, light: &AreaLight, p: DVec3, q: DVec3) -> f64 {
+    let ray = Ray::new(p.as_vec3(), (q - p).normalize().as_vec3());
+    let hit = geometry.shape(light.shape).intersect_prim(&ray, light.shape, PrimId(0));
+    let at = hit.and_then(|hit| geometry.interaction(&ray, &hit));
+    at.map_or(0.0, |at| light.pdf(geometry, &LightSampleContext::from_any_side(p), &ray, &at).into())
 }
 
 /// Means over a grid of samples: the inverse density, and the irradiance of radiance 1.
@@ -98,6 +112,25 @@ const POINTS: [[f64; 3]; 10] = [
     [1.5, 1.5, 1e-5],
 ];
 
+/// Relative errors of the mean inverse densities of squares seen on their axis, by solid angle and by area.
+fn squares() -> [f64; 2] {
+    // On the axis: 4 atan(a² / (h sqrt(2 a² + h²))), a face of a cube from its middle among them: a sixth of the
+    // sphere.
+    let (mut sizes, mut by_area) = (0f64, 0f64);
+    for size in [1e-9, 1e-3, 1.0, 2.0, 1e3, 1e9] {
+        let (geometry, light) = quad_light(DVec3::new(-0.5 * size, -0.5 * size, 1.0), DVec3::X * size, DVec3::Y * size);
+        let a = 0.5 * size;
+        let exact = 4.0 * (a * a / (2.0 * a * a + 1.0).sqrt()).atan();
+        let error = (means(&geometry, &light, DVec3::ZERO, DVec3::Z, 100)[0] / exact - 1.0).abs();
+        if has_one_density(&geometry, &light, DVec3::ZERO) {
+            sizes = sizes.max(error);
+        } else {
+            by_area = by_area.max(error);
+        }
+    }
+    [sizes, by_area]
+}
+
 pub(super) fn l6_polygons(effort: Effort) -> Outcome {
     let (corner, u, v) = (DVec3::new(-1.0, -0.5, 0.0), DVec3::X * 3.0, DVec3::Y * 2.0);
     let (geometry, light) = quad_light(corner, u, v);
@@ -122,30 +155,23 @@ pub(super) fn l6_polygons(effort: Effort) -> Outcome {
             let [i, j] = [d.y / 2.0, d.x / 3.0].map(|x| ((x * CELLS as f64) as usize).min(CELLS - 1));
             counts[i * CELLS + j] += 1;
         }
+        let share = |columns: usize, k: usize| {
+            let (u, v) = (u / columns as f64, v / columns as f64);
+            let at = corner + u * (k % columns) as f64 + v * (k / columns) as f64;
+            let pdf = if by_solid_angle { 1.0 / whole } else { density(&geometry, &light, p, at + 0.5 * (u + v)) };
+            quad_solid_angle(p, at, u, v) * pdf
+        };
         let cell = |k: usize| {
-            if !by_solid_angle {
-                return f64::from(n) / (CELLS * CELLS) as f64;
-            }
-            let at = corner + u * ((k % CELLS) as f64 / CELLS as f64) + v * ((k / CELLS) as f64 / CELLS as f64);
-            f64::from(n) * quad_solid_angle(p, at, u / CELLS as f64, v / CELLS as f64) / whole
+            // The density by solid angle is the same everywhere in a cell, that by area is not.
+            let parts = if by_solid_angle { 1 } else { PARTS };
+            let first = k / CELLS * parts * CELLS * parts + k % CELLS * parts;
+            let part = |i: usize| share(CELLS * parts, first + i / parts * CELLS * parts + i % parts);
+            f64::from(n) * (0..parts * parts).map(part).sum::<f64>()
         };
         tests.counts(&format!("from {p}"), &counts, &(0..CELLS * CELLS).map(cell).collect::<Vec<_>>());
     }
 
-    // On the axis: 4 atan(a² / (h sqrt(2 a² + h²))), a face of a cube from its middle among them: a sixth of the
-    // sphere.
-    let (mut sizes, mut by_area) = (0f64, 0f64);
-    for size in [1e-9, 1e-3, 1.0, 2.0, 1e3, 1e9] {
-        let (geometry, light) = quad_light(DVec3::new(-0.5 * size, -0.5 * size, 1.0), DVec3::X * size, DVec3::Y * size);
-        let a = 0.5 * size;
-        let exact = 4.0 * (a * a / (2.0 * a * a + 1.0).sqrt()).atan();
-        let error = (means(&geometry, &light, DVec3::ZERO, DVec3::Z, 100)[0] / exact - 1.0).abs();
-        if has_one_density(&geometry, &light, DVec3::ZERO) {
-            sizes = sizes.max(error);
-        } else {
-            by_area = by_area.max(error);
-        }
-    }
+    let [sizes, by_area] = squares();
     let outcome = Outcome::new()
         .at_most("error of the irradiance of radiance 1", irradiances(effort.pick(300, 1000)), 1e-3)
         .at_most("relative error of the density by solid angle", densities, 1e-6)
