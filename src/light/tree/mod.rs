@@ -103,7 +103,7 @@ impl LightTree {
             cut.total += sum;
             i += 1;
         }
-        cut.total > 0.0 && cut.total < f32::INFINITY
+        cut.total > 0.0
     }
 
     /// A light, `u` in `[0, 1)`; `None` where nothing arrives.
@@ -175,7 +175,7 @@ fn pmf(tree: &LightTree, p: Vec3, n: Vec3, light: u32) -> f32 {
 #[inline(always)]
 fn total(importances: &[f32; WIDTH]) -> Option<f32> {
     let total = importances.iter().sum();
-    (total > 0.0 && total < f32::INFINITY).then_some(total)
+    (total > 0.0).then_some(total)
 }
 
 /// An entry found by [`pick`].

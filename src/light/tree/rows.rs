@@ -59,7 +59,6 @@ fn choose(node: &Node, queries: &LightQueries, share: f32, choices: &mut LightCh
     }
     for i in 0..count {
         let pmf = pmfs[i] / totals[i] * share;
-        let arrives = (totals[i] > 0.0) & (totals[i] < f32::INFINITY);
-        pmfs[i] = if arrives { pmf } else { 0.0 };
+        pmfs[i] = if totals[i] > 0.0 { pmf } else { 0.0 };
     }
 }

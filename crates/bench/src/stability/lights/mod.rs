@@ -50,7 +50,7 @@ checks! {
          density, all directions together, weights, a ramp, seam and poles (Mitsuba 3, test_envmap)";
     "L8" l8_choice "choice of a light":
         "58 lights of every kind, with a sky and without, by power and by the tree, and 100 points that reach \
-         everywhere: sums, probabilities told and asked for, frequencies, the mean of 1 / (n p) (pbrt, \
+         everywhere: sums, probabilities of choices and of pmf, frequencies, the mean of 1 / (n p) (pbrt, \
          lightsamplers_test)";
     "L9" l9_tables "discrete distributions":
         "alias tables and piecewise constant densities with zeros: frequencies, first and last random number, what is \

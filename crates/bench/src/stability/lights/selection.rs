@@ -177,7 +177,7 @@ pub(super) fn l8_choice(effort: Effort) -> Outcome {
     let outcome = Outcome::new()
         .at_most("error of sums of probabilities where all lights reach", exact, 1e-5)
         .at_most("excess of sums elsewhere", excess, 1e-5)
-        .at_most("relative difference of the probability told and asked for", difference, 1e-5)
+        .at_most("relative difference of the probability of a choice and pmf", difference, 1e-5)
         .within("mean of 1 / (n p), by the tree", mean, 0.98, 1.02)
         .at_most("error of the mean of 1 / (n p), by power", power_mean, effort.pick(0.1, 0.02));
     tests.judge(outcome)
