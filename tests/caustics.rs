@@ -163,21 +163,28 @@ fn lamp_beside_a_mirror(lamp: &Value) -> Value {
     scene
 }
 
-/// Whether a floor is seen at this x and z.
-type IsSeen = fn(f64, f64) -> bool;
+/// The height above the floor and the slope along z of what is seen at this x and z, if anything.
+type Surface = fn(f64, f64) -> Option<[f64; 2]>;
 
-/// Mean radiance of the picture where such a floor is seen at some x and z, by a lamp of intensity 1 at this x, 1 above
-/// the floor.
-fn radiance_of(lamp: f64, is_seen: IsSeen) -> f64 {
+/// Mean radiance of the picture where such a surface is seen, by a lamp of intensity 1 at this x, 1 above the floor.
+fn radiance_of(lamp: f64, surface: Surface) -> f64 {
     let at = |i: i32| (f64::from(i) + 0.5) / 600.0 * 2.4 - 1.2;
-    let points = (0..600).flat_map(|i| (0..600).map(move |j| (at(i) + 2.5, at(j)))).filter(|&(x, z)| is_seen(x, z));
-    let irradiance = points.map(|(x, z)| ((x - lamp).powi(2) + 1.0 + z * z).powf(-1.5)).sum::<f64>() / 360_000.0;
-    0.5 / std::f64::consts::PI * irradiance
+    let points = (0..600).flat_map(|i| (0..600).map(move |j| (at(i) + 2.5, at(j))));
+    let irradiance = points.filter_map(|(x, z)| {
+        let [y, slope] = surface(x, z)?;
+        let (above, distance) = (1.0 - y, ((x - lamp).powi(2) + (1.0 - y).powi(2) + z * z).sqrt());
+        Some((above + slope * z).max(0.0) / (slope.hypot(1.0) * distance.powi(3)))
+    });
+    0.5 / std::f64::consts::PI * irradiance.sum::<f64>() / 360_000.0
+}
+
+fn floor_if(is_seen: bool) -> Option<[f64; 2]> {
+    is_seen.then_some([0.0, 0.0])
 }
 
 /// The same of the whole floor.
 fn floor_radiance(lamp: f64) -> f64 {
-    radiance_of(lamp, |_, _| true)
+    radiance_of(lamp, |_, _| Some([0.0, 0.0]))
 }
 
 /// The mean of the red channel of a picture of that floor.
@@ -231,11 +238,16 @@ fn pictures_with_photons_do_not_depend_on_threads_or_accelerators() {
     assert_ne!(first, of_seed(&balls(), CausticsDesc::Paths, 0, 12));
 }
 
-/// Photons are gathered within 0.15: a floor of narrower strips, one between blocks that stand on it, and one with a
-/// partition that is thinner. The lamp and what the mirror shows of it are in the plane of the partition and above the
-/// middle between the blocks.
+/// The width of a fold, seen from above.
+const FOLD: f64 = 0.05;
+/// Its height over its width.
+const SLOPE: f64 = 0.3;
+
+/// Photons are gathered within 0.15: a floor of narrower strips, one between blocks that stand on it, one with a
+/// partition that is thinner, and one in folds, whose area is larger. The lamp and what the mirror shows of it are in
+/// the plane of the partition and above the middle between the blocks. Without photons paths never find the latter.
 #[test]
-fn what_photons_carry_to_edges_and_corners_is_not_lost() {
+fn what_photons_carry_to_narrow_and_curved_surfaces_is_kept() {
     let point = json!({ "type": "point", "position": [1, 1, 0], "intensity": [1, 1, 1] });
     let strip = |from: f64, width: f64| {
         json!({ "type": "quad", "material": "white", "origin": [from, 0, 3], "edge_u": [width, 0, 0],
@@ -247,19 +259,29 @@ fn what_photons_carry_to_edges_and_corners_is_not_lost() {
     };
     let slats = (0..12).map(|i| f64::from(i) * 0.2 + 1.36);
     let floor = strip(0.0, 6.0);
-    let cases: [(&str, Vec<Value>, IsSeen); 3] = [
-        ("slats", slats.map(|from| strip(from, 0.06)).collect(), |x, _| x > 1.36 && (x - 1.36) % 0.2 < 0.06),
-        ("blocks", vec![floor.clone(), block(1.0, 1.1), block(1.0, -1.1)], |_, z| z.abs() < 0.1),
-        ("partition", vec![floor, block(1e-3, 0.0)], |_, _| true),
+    let fold = |i: i32| {
+        let rise = if i % 2 == 0 { SLOPE * FOLD } else { -SLOPE * FOLD };
+        json!({ "type": "quad", "material": "white", "origin": [0, (-rise).max(0.0), f64::from(i + 1) * FOLD],
+                "edge_u": [6, 0, 0], "edge_v": [0, rise, -FOLD] })
+    };
+    let on_fold = |_, z: f64| {
+        let along = (z / FOLD).rem_euclid(2.0) - 1.0;
+        Some([SLOPE * FOLD * along.abs(), SLOPE * along.signum()])
+    };
+    let cases: [(&str, Vec<Value>, Surface); 4] = [
+        ("slats", slats.map(|from| strip(from, 0.06)).collect(), |x, _| floor_if(x > 1.36 && (x - 1.36) % 0.2 < 0.06)),
+        ("blocks", vec![floor.clone(), block(1.0, 1.1), block(1.0, -1.1)], |_, z| floor_if(z.abs() < 0.1)),
+        ("partition", vec![floor, block(1e-3, 0.0)], |_, _| floor_if(true)),
+        ("folds", (-30..30).map(fold).collect(), on_fold),
     ];
-    for (what, shapes, is_seen) in cases {
+    for (what, shapes, surface) in cases {
         let mut scene = lamp_beside_a_mirror(&point);
         scene["materials"]["black"] = json!({ "type": "diffuse", "albedo": 0 });
         let mirror = scene["shapes"][1].clone();
         scene["shapes"] = json!([mirror]);
         scene["shapes"].as_array_mut().unwrap().extend(shapes);
-        let [direct, mirrored] = [1.0, -1.0].map(|lamp| radiance_of(lamp, is_seen));
-        let found = (mean_red(&scene, CausticsDesc::Photons, &with_samples(512)) - direct) / mirrored;
+        let mean = |caustics| mean_red(&scene, caustics, &with_samples(512));
+        let found = (mean(CausticsDesc::Photons) - mean(CausticsDesc::Paths)) / radiance_of(-1.0, surface);
         // Five standard errors: some 32,000 photons arrive between the blocks.
         assert!((found - 1.0).abs() < 0.03, "{what}: {found}");
     }

@@ -28,9 +28,9 @@ pub struct DiscSamples<'a> {
     pub seed: PixelSeed,
 }
 
-/// Multiplies the power of each photon by an estimate of the area of its disc over that of the surfaces within it that
-/// gather the photon, and counts the rays traced. Else what photons carry to edges and into corners would be lost, for
-/// beyond an edge nothing gathers.
+/// Multiplies the power of each photon by an estimate of the area of its disc over that of the part which is projected
+/// on surfaces that gather the photon, and counts the rays traced. Else what photons carry to edges and into corners
+/// would be lost, for beyond an edge nothing gathers.
 ///
 /// The number of points of the disc that have to be tried before one is on such a surface has the expected value wanted
 /// ("Unbiased Photon Gathering for Light Transport Simulation", Qin et al. 2015, estimates another probability by it).
@@ -39,7 +39,8 @@ pub struct DiscSamples<'a> {
 /// Mirrors and glass beside a surface that gathers count as part of it.
 pub fn correct_for_coverage(photons: &mut [Photon], world: &World, radius: f32, samples: DiscSamples) -> u64 {
     let correct = |(i, photon): (usize, &mut Photon)| {
-        let mut disc = Disc::new(world, photon, radius);
+        let mut disc =
+            Disc { world, p: photon.p, frame: Frame::from_normal(photon.n), radius, height: radius, rays: 0 };
         let mut tries = (0..TRIED / 2).flat_map(|set| {
             let [a, b, c, d] = samples.sampler.sample_4d(samples.seed, i as u32, set);
             [[a, b], [c, d]].map(concentric_disk)
@@ -57,6 +58,7 @@ pub fn correct_for_coverage(photons: &mut [Photon], world: &World, radius: f32, 
                 break;
             }
         }
+        photon.height = disc.height / radius;
         if found > 0 {
             photon.power *= first + tried as f32 / found as f32;
         }
@@ -65,7 +67,7 @@ pub fn correct_for_coverage(photons: &mut [Photon], world: &World, radius: f32, 
     photons.par_iter_mut().enumerate().map(correct).sum()
 }
 
-/// The disc around a photon, seen from a point above it.
+/// The disc around a photon, and the apex above it from which it is projected.
 struct Disc<'a> {
     world: &'a World<'a>,
     p: Vec3,
@@ -76,13 +78,8 @@ struct Disc<'a> {
     rays: u64,
 }
 
-impl<'a> Disc<'a> {
-    fn new(world: &'a World<'a>, photon: &Photon, radius: f32) -> Self {
-        let n = if photon.wi.dot(photon.n) < 0.0 { -photon.n } else { photon.n };
-        Self { world, p: photon.p, frame: Frame::from_normal(n), radius, height: radius, rays: 0 }
-    }
-
-    /// Moves the point from which the disc is seen below what is above the photon, if anything is.
+impl Disc<'_> {
+    /// Moves the apex below what is above the photon, if anything is.
     fn lower_below_obstacle(&mut self) -> bool {
         self.rays += 1;
         let up = Ray { t_min: 0.05 * self.height, t_max: self.height, ..Ray::new(self.p, self.frame.z) };

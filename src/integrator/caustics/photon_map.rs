@@ -14,7 +14,7 @@ use crate::math::float::floor;
 pub struct Photon {
     /// Where.
     pub p: Vec3,
-    /// Unit geometric normal there, of either side.
+    /// Unit geometric normal there, on the side of `wi`.
     pub n: Vec3,
     /// Unit direction to where the light comes from.
     pub wi: Vec3,
@@ -29,6 +29,24 @@ pub struct Photon {
     pub light: LightId,
     /// Scatterings on its way.
     pub scatterings: u32,
+    /// Height above it of the apex from which its disc is projected, over the radius of the disc.
+    pub height: f32,
+}
+
+impl Photon {
+    /// The kernel of the density estimate, 1 on a plane: the area of the disc over that of its projection, at the point
+    /// `d` radii from the photon, of a surface with the unit normal `n`. So a curved surface or a slope, whose area is
+    /// larger, gathers no more than a plane.
+    #[inline]
+    fn kernel(&self, d: Vec3, n: Vec3) -> f32 {
+        let from_apex = d - self.n * self.height;
+        let depth = -from_apex.dot(self.n);
+        let per_depth = 1.0 / depth;
+        let squared_scale = (self.height * per_depth).powi(2);
+        let across = from_apex.length_squared() - depth * depth;
+        let is_projected = depth > 0.0 && across * squared_scale < 1.0;
+        if is_projected { from_apex.dot(n).abs() * per_depth * squared_scale } else { 0.0 }
+    }
 }
 
 /// Photons by the cells of a grid from which they can be gathered, each in all of them. Cells share buckets by a hash:
@@ -113,15 +131,25 @@ impl PhotonMap {
     }
 
     /// The photons among the candidates of a point that are around it, where a surface has the unit geometric normal
-    /// `n`.
+    /// `n`, with their kernels.
     #[inline]
-    pub fn near<'a>(&'a self, candidates: &'a [PhotonReference], p: Vec3, n: Vec3) -> impl Iterator<Item = &'a Photon> {
+    pub fn near<'a>(
+        &'a self,
+        candidates: &'a [PhotonReference],
+        p: Vec3,
+        n: Vec3,
+    ) -> impl Iterator<Item = (&'a Photon, f32)> {
+        let per_radius = 1.0 / self.radius;
         candidates.iter().filter_map(move |reference| {
             if !is_around(reference.p - p, n, self.radius) {
                 return None;
             }
             let photon = &self.photons[reference.photon as usize];
-            is_about_parallel(photon.n, n).then_some(photon)
+            if !is_about_parallel(photon.n, n) {
+                return None;
+            }
+            let kernel = photon.kernel((p - reference.p) * per_radius, n);
+            (kernel > 0.0).then_some((photon, kernel))
         })
     }
 

@@ -80,13 +80,13 @@ pub(super) fn gather(context: &Context, wave: &mut Wave, block: usize, out: &mut
     let scatters = |lane: usize| rows.flags[lane] & vertex_flags::UNGATHERED == 0;
     for lane in (0..(*count).min(BATCH)).filter(|&lane| !candidates[lane].is_empty() && scatters(lane)) {
         let (p, n) = (points.p.get(lane).as_vec3(), rows.n_g.get(lane));
-        for photon in photons.near(candidates[lane], p, n) {
+        for (photon, kernel) in photons.near(candidates[lane], p, n) {
             let scatterings = context.bounce + 1 + photon.scatterings;
             let Some(scattered) = scattered(context, vertices, lane, photon) else { continue };
             if scatterings >= context.config.max_depth {
                 continue;
             }
-            let (slot, light) = (rows.slot[lane], rows.throughput.get(lane) * scattered.light);
+            let (slot, light) = (rows.slot[lane], rows.throughput.get(lane) * scattered.light * kernel);
             let light = context.config.clamped(light, scatterings);
             out.add(slot, light);
             moments.add_photon(slot, light, scattered.weight, scattered.density_ratio);

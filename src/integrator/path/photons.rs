@@ -172,14 +172,16 @@ fn store(wave: &Wave, block: usize, scatterings: u32, photons: &mut Vec<Photon>)
     let Vertices { rows, points, count, .. } = &wave.vertices;
     for lane in (0..*count).filter(|&lane| rows.flags[lane] & vertex_flags::UNGATHERED == 0) {
         let PhotonState { density, light, .. } = wave.photons[block * BATCH + wave.vertices.path(lane)];
+        let (n, wi) = (rows.n_g.get(lane), -rows.direction.get(lane));
         photons.push(Photon {
             p: points.p.get(lane).as_vec3(),
-            n: rows.n_g.get(lane),
-            wi: -rows.direction.get(lane),
+            n: if wi.dot(n) < 0.0 { -n } else { n },
+            wi,
             power: rows.throughput.get(lane),
             density,
             light,
             scatterings,
+            height: 1.0,
         });
     }
 }
