@@ -38,7 +38,7 @@ impl Ray {
 
     /// Whether this ray can be traced: finite and not huge, a direction that is not zero, `0 <= t_min <= t_max`, time
     /// within `[0, 1]`. All other rays hit nothing, by definition.
-    #[inline]
+    #[inline(always)]
     pub fn is_valid(&self) -> bool {
         let limit = EMBREE_LARGE;
         let inside = |v: Vec3| v.x.abs() < limit && v.y.abs() < limit && v.z.abs() < limit;

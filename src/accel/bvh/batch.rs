@@ -17,6 +17,7 @@ use crate::geometry::{Hit, Shear, ShearRows, TriangleHit, TriangleRay, largest_a
 use crate::math::compact::set_bits;
 use crate::math::prefetch::{address, prefetch_lines};
 use crate::math::rows::{BATCH, Row, WIDTH as ROW_WIDTH, whole_vectors};
+use crate::math::vectorize::vectorize;
 use crate::math::{Ray, RayRows};
 
 /// Rays that are traversed at once: a bit each.
@@ -32,13 +33,18 @@ pub(super) struct Batch<'r, 'a> {
     pub count: usize,
 }
 
-/// What one thread needs to trace batches.
-pub(super) struct Scratch {
+/// What is found of all rays before they are traced.
+struct PreparedRows {
     slabs: SlabRows,
     shears: ShearRows,
     axes: Row<u32>,
-    t_max: Row,
     is_valid: Row<u32>,
+}
+
+/// What one thread needs to trace batches.
+pub(super) struct Scratch {
+    prepared: PreparedRows,
+    t_max: Row,
     keys: Row<u32>,
     /// The node or leaf that each ray visits next.
     next: [Child; BATCH],
@@ -58,11 +64,13 @@ pub(super) fn with_scratch(trace: impl FnOnce(&mut Scratch)) {
 impl Default for Scratch {
     fn default() -> Self {
         Self {
-            slabs: SlabRows::default(),
-            shears: ShearRows::default(),
-            axes: [0; BATCH],
+            prepared: PreparedRows {
+                slabs: SlabRows::default(),
+                shears: ShearRows::default(),
+                axes: [0; BATCH],
+                is_valid: [0; BATCH],
+            },
             t_max: [0.0; BATCH],
-            is_valid: [0; BATCH],
             keys: [0; BATCH],
             next: [Child::ROOT; BATCH],
             stacks: [Stack { entries: [Entry::NONE; STACK + WIDTH], len: 0 }; SLOTS],
@@ -77,6 +85,20 @@ impl Scratch {
     fn prepare(&mut self, wide: &Wide, batch: &Batch<'_, '_>) {
         let rays = batch.rays;
         let count = whole_vectors(batch.count);
+        vectorize!(self.prepared.set(wide, batch, count));
+        self.t_max = rays.t_max;
+        self.next = [Child::ROOT; BATCH];
+        let cutouts = &batch.accel.geometry().cutouts;
+        for (i, keys) in self.keys.chunks_mut(ROW_WIDTH).enumerate().take(count / ROW_WIDTH) {
+            cutouts.set_keys(rays, i * ROW_WIDTH, keys);
+        }
+    }
+}
+
+impl PreparedRows {
+    #[inline(always)]
+    fn set(&mut self, wide: &Wide, batch: &Batch<'_, '_>, count: usize) {
+        let rays = batch.rays;
         for lane in 0..count {
             let ray = rays.get(lane);
             self.slabs.set(lane, &SlabRay::new(&ray, &wide.bounds, batch.accel.instance_slack(&ray)));
@@ -88,12 +110,6 @@ impl Scratch {
         for lane in 0..count {
             let (origin, direction) = (rays.origin.get(lane), rays.direction.get(lane));
             self.shears.set(lane, &Shear::new(origin, direction, self.axes[lane]));
-        }
-        self.t_max = rays.t_max;
-        self.next = [Child::ROOT; BATCH];
-        let cutouts = &batch.accel.geometry().cutouts;
-        for (i, keys) in self.keys.chunks_mut(ROW_WIDTH).enumerate().take(count / ROW_WIDTH) {
-            cutouts.set_keys(rays, i * ROW_WIDTH, keys);
         }
     }
 }
@@ -158,7 +174,7 @@ pub(super) fn trace<L: SimdIsa, const ANY: bool>(
     let mut rest = 0..count;
     loop {
         for slot in set_bits(std::mem::take(&mut tracer.ended)) {
-            let Some(lane) = rest.find(|&lane| tracer.scratch.is_valid[lane] != 0) else { break };
+            let Some(lane) = rest.find(|&lane| tracer.scratch.prepared.is_valid[lane] != 0) else { break };
             lane_of[slot] = lane;
             tracer.scratch.stacks[slot].len = 0;
             tracer.places.nodes |= 1 << slot;
@@ -197,14 +213,14 @@ impl<A: Answers> Tracer<'_, '_, '_, A> {
     fn open<L: SimdIsa, const ANY: bool>(&mut self, lanes: L, slot: usize, lane: usize) {
         let scratch = &mut *self.scratch;
         let node = &self.wide.nodes[scratch.next[lane].node_index()];
-        let ray = WideRay::new(scratch.slabs.get(lane));
+        let ray = WideRay::new(scratch.prepared.slabs.get(lane));
         // Not a negative zero: bits of distances are compared.
         let t_min = self.batch.rays.t_min[lane] + 0.0;
         let (_, enter) = lanes.enter(node, &ray, t_min, scratch.t_max[lane]);
         let order = if ANY && self.any_hit_order == AnyHitOrder::Occlusion {
             WideNode::BY_SLOT
         } else {
-            node.orders[scratch.slabs.negative[lane] as usize % 8]
+            node.orders[scratch.prepared.slabs.negative[lane] as usize % 8]
         };
         let (entries, count) = lanes.ordered(enter, order, &node.children);
         scratch.stacks[slot].push(entries, count);
@@ -257,7 +273,8 @@ impl<A: Answers> Tracer<'_, '_, '_, A> {
         let scratch = &mut *self.scratch;
         let (rays, geometry) = (self.batch.rays, self.batch.accel.geometry());
         let (t_min, t_max) = (rays.t_min[lane].into(), scratch.t_max[lane].into());
-        let ray = TriangleRay { kz: scratch.axes[lane], shear: scratch.shears.get(lane), t_min, t_max };
+        let ray =
+            TriangleRay { kz: scratch.prepared.axes[lane], shear: scratch.prepared.shears.get(lane), t_min, t_max };
         let Some(hits) = lanes.intersect(block, &ray) else { return false };
         for i in set_bits(hits.mask) {
             let ItemKind::Prim(shape, prim) = block.items[i].kind() else { continue };
