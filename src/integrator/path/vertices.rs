@@ -5,10 +5,11 @@ use super::block::{AnalyticScratch, PointRows, TriangleRows, VertexRows, Vertice
 use super::wave::{PathRows, Wave};
 use crate::accel::HitRows;
 use crate::color::Rgb;
-use crate::geometry::{Hit, Shape, TrianglePoints, interpolated_normal, interpolated_uv, uv_area, uv_density};
+use crate::geometry::{Hit, Mesh, Shape, TrianglePoints, interpolated_normal, interpolated_uv, uv_area, uv_density};
 use crate::id::ShapeId;
 use crate::integrator::shading::{adapted_normal, is_consistent};
 use crate::math::compact::{Compaction, collect_lanes, sort_lanes};
+use crate::math::prefetch::{address, prefetch_lines};
 use crate::math::rows::{BATCH, Element, Row, Vec3Rows, whole_vectors};
 use crate::math::vectorize::vectorize;
 use crate::math::{Frame, Ray, RayRows, Vec2};
@@ -22,24 +23,8 @@ pub(super) fn find(context: &Context, wave: &mut Wave, block: usize) {
     let lanes = Compaction::different(&hits.shape, HitRows::MISS, count);
     collect_lanes(&mut vertices.misses, count, |path| !lanes.contains(path));
     start_vertices(vertices, &lanes, paths, rays, hits);
-    let mut triangles = 0;
-    for lane in 0..vertices.count.min(BATCH) {
-        let Vertices { rows, triangles: corners, .. } = vertices;
-        let mesh = if rows.instance[lane] == Hit::NO_INSTANCE.0 {
-            context.world.mesh_without_tangents(ShapeId(rows.shape[lane]))
-        } else {
-            None
-        };
-        rows.is_unresolved[lane] = u32::from(mesh.is_none());
-        if let Some(mesh) = mesh {
-            triangles += 1;
-            // The positions are gathered in a loop of their own: here all lanes wait for memory together.
-            [corners.a_index[lane], corners.b_index[lane], corners.c_index[lane]] =
-                mesh.triangles()[rows.prim[lane] as usize];
-        }
-    }
-    if triangles > 0 {
-        gather_triangles(context, vertices);
+    if let Some(meshes) = gather_indices(context, vertices) {
+        gather_triangles(context, vertices, &meshes);
         let Vertices { count, rows, triangles, points, .. } = vertices;
         match (features.shading_normals, features.parameters) {
             (false, false) => vectorize!(intersect_triangles::<false, false>(triangles, rows, points, *count)),
@@ -158,13 +143,40 @@ fn resolve_analytic(context: &Context, vertices: &mut Vertices, rays: &RayRows, 
 /// Hits on one shape that are worth a vector.
 const MIN_ANALYTIC_LANES: usize = 3;
 
+/// Gathers the indices of the triangles' corners; the result is the meshes, if there are any.
+fn gather_indices<'a>(context: &Context<'a>, vertices: &mut Vertices) -> Option<[Option<&'a Mesh>; BATCH]> {
+    let Vertices { count, rows, triangles, .. } = vertices;
+    let mut meshes = [None; BATCH];
+    let mut has_triangles = false;
+    // Prefetched, so that all lanes wait for memory together.
+    for (lane, mesh) in meshes.iter_mut().enumerate().take(*count) {
+        if rows.instance[lane] == Hit::NO_INSTANCE.0 {
+            *mesh = context.world.mesh_without_tangents(ShapeId(rows.shape[lane]));
+        }
+        rows.is_unresolved[lane] = u32::from(mesh.is_none());
+        if let Some(mesh) = mesh {
+            has_triangles = true;
+            prefetch_lines(address(mesh.triangles(), rows.prim[lane] as usize), 1);
+        }
+    }
+    if !has_triangles {
+        return None;
+    }
+    for (lane, mesh) in meshes.iter().enumerate().take(*count) {
+        if let Some(mesh) = mesh {
+            [triangles.a_index[lane], triangles.b_index[lane], triangles.c_index[lane]] =
+                mesh.triangles()[rows.prim[lane] as usize];
+        }
+    }
+    Some(meshes)
+}
+
 /// Gathers the corners of the triangles.
-fn gather_triangles(context: &Context, vertices: &mut Vertices) {
+fn gather_triangles(context: &Context, vertices: &mut Vertices, meshes: &[Option<&Mesh>; BATCH]) {
     let features = &context.scene.features;
     let Vertices { count, rows, triangles, .. } = vertices;
-    for lane in (0..BATCH.min(*count)).filter(|&lane| rows.is_unresolved[lane] == 0) {
-        let shape = ShapeId(rows.shape[lane]);
-        let Shape::Mesh(mesh) = context.scene.geometry.shape(shape) else { continue };
+    for (lane, mesh) in meshes.iter().enumerate().take(*count) {
+        let Some(mesh) = mesh else { continue };
         let indices = [triangles.a_index[lane], triangles.b_index[lane], triangles.c_index[lane]];
         let TrianglePoints { a, b, c } = mesh.points(indices);
         triangles.a.set(lane, a);
@@ -178,7 +190,11 @@ fn gather_triangles(context: &Context, vertices: &mut Vertices) {
             triangles.n_c.set(lane, c);
         }
         if features.parameters {
-            let [a, b, c] = if context.world.uses_uv(shape) { mesh.vertex_uvs(indices) } else { [Vec2::ZERO; 3] };
+            let [a, b, c] = if context.world.uses_uv(ShapeId(rows.shape[lane])) {
+                mesh.vertex_uvs(indices)
+            } else {
+                [Vec2::ZERO; 3]
+            };
             triangles.uv_a.set(lane, a);
             triangles.uv_b.set(lane, b);
             triangles.uv_c.set(lane, c);
