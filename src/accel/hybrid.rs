@@ -5,7 +5,7 @@ use super::bvh::{Bvh, BvhOptions};
 use super::embree::{EmbreeAccel, EmbreeOptions};
 use super::packet::{Hierarchy, has_intervals};
 use super::tree::TwoLevel;
-use super::{Accelerator, Coherence, HitRows, intersect_in_rows};
+use super::{AccelKind, Accelerator, Coherence, HitRows, intersect_in_rows};
 use crate::error::Result;
 use crate::geometry::{Geometry, Hit, Shape};
 use crate::id::{PrimId, ShapeId};
@@ -14,6 +14,9 @@ use crate::math::{Aabb, Ray, RayRows};
 
 /// Up to this number of analytic shapes, packets beside Embree are mostly faster (`docs/accelerators.md`).
 const FEW: usize = 16;
+
+/// Up to this number, packets beside the BVH are mostly faster than the BVH for all shapes.
+const FEW_BESIDE_BVH: usize = 128;
 
 /// The most triangles of a mesh that is traced in packets: a floor, or walls.
 const MAX_MESH_TRIANGLES: usize = 48;
@@ -25,8 +28,8 @@ const MAX_WALL_TRIANGLES: usize = 80;
 const MIN_WALL_AREA: f32 = 0.02;
 
 /// With so many triangles, the build of the BVH takes three times as long as Embree's and 1.8 times the memory
-/// (`docs/accelerators.md`).
-const MAX_TRIANGLES: usize = 2_000_000;
+/// (`docs/accelerators.md`). Analytic shapes count as well.
+const MAX_PRIMS: usize = 2_000_000;
 
 /// What traces what is not in packets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -67,8 +70,8 @@ impl<'g> HybridAccel<'g> {
         Ok(Self { others, shapes, packets, geometry })
     }
 
-    /// What is faster than Embree alone for `geometry`, if anything is.
-    pub fn suiting(geometry: &Geometry) -> Option<HybridOptions> {
+    /// What is fastest for `geometry`: packets beside one of both, or one of both alone.
+    pub fn suiting(geometry: &Geometry) -> AccelKind {
         let (in_packets, others): (Vec<ShapeId>, Vec<ShapeId>) =
             geometry.world.iter().partition(|&&id| is_traced_in_packets(geometry, id));
         let in_packets = in_packets.len();
@@ -76,9 +79,16 @@ impl<'g> HybridAccel<'g> {
         let bvh = Bvh::is_vectorized()
             && geometry.instances.is_empty()
             && others.iter().all(|&id| is_resting_mesh(geometry.shape(id)))
-            && in_packets <= FEW
-            && (1..=MAX_TRIANGLES).contains(&triangles);
-        (bvh || (1..=FEW).contains(&in_packets)).then_some(HybridOptions { bvh })
+            && triangles > 0
+            && triangles + in_packets <= MAX_PRIMS;
+        let few = if bvh { 0..=FEW_BESIDE_BVH } else { 1..=FEW };
+        if few.contains(&in_packets) {
+            AccelKind::Hybrid(HybridOptions { bvh })
+        } else if bvh {
+            AccelKind::Bvh(BvhOptions::default())
+        } else {
+            AccelKind::EMBREE
+        }
     }
 
     /// The closest hit of one ray on the shapes in packets.

@@ -67,9 +67,9 @@ impl AccelKind {
     pub const CHOICES: &'static [(&'static str, &'static str)] = &[
         (
             "auto",
-            "packets for at most 40 primitives beside spheres and cylinders, at rest, without holes; hybrid:bvh for \
-             up to 2 million triangles of meshes at rest, without instances, beside at most 16 spheres, cylinders, \
-             disks and quads; hybrid for at most 16 of these beside others; else embree",
+            "packets for at most 40 primitives beside spheres and cylinders, at rest, without holes; without \
+             instances and up to 2 million primitives, hybrid:bvh for meshes at rest beside at most 128 spheres, \
+             cylinders, disks and quads, bvh beside more; hybrid for at most 16 of these beside others; else embree",
         ),
         ("embree", "Embree: fastest to build, for any scene; build quality medium, robust"),
         ("embree:low", "built faster, traced slower"),
@@ -178,10 +178,7 @@ impl TryFrom<String> for AccelKind {
 pub fn build(kind: AccelKind, geometry: &Geometry, threads: usize) -> Result<Box<dyn Accelerator + '_>> {
     Ok(match kind {
         AccelKind::Auto if PacketBvh::suits(geometry) => Box::new(PacketBvh::new(geometry, threads)),
-        AccelKind::Auto => {
-            let kind = HybridAccel::suiting(geometry).map_or(AccelKind::EMBREE, AccelKind::Hybrid);
-            build(kind, geometry, threads)?
-        }
+        AccelKind::Auto => build(HybridAccel::suiting(geometry), geometry, threads)?,
         AccelKind::Embree(options) => Box::new(EmbreeAccel::with_options(geometry, threads, options)?),
         AccelKind::Packets => Box::new(PacketBvh::new(geometry, threads)),
         AccelKind::Hybrid(options) => Box::new(HybridAccel::new(geometry, threads, options)?),
