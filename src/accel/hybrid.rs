@@ -5,18 +5,12 @@ use super::bvh::{Bvh, BvhOptions};
 use super::embree::{EmbreeAccel, EmbreeOptions};
 use super::packet::{Hierarchy, has_intervals};
 use super::tree::TwoLevel;
-use super::{AccelKind, Accelerator, Coherence, HitRows, intersect_in_rows};
+use super::{Accelerator, Coherence, HitRows, intersect_in_rows};
 use crate::error::Result;
 use crate::geometry::{Geometry, Hit, Shape};
 use crate::id::{PrimId, ShapeId};
 use crate::math::rows::BATCH;
 use crate::math::{Aabb, Ray, RayRows};
-
-/// Up to this number of analytic shapes, packets beside Embree are mostly faster (`docs/accelerators.md`).
-const FEW: usize = 16;
-
-/// Up to this number, packets beside the BVH are mostly faster than the BVH for all shapes.
-const FEW_BESIDE_BVH: usize = 128;
 
 /// The most triangles of a mesh that is traced in packets: a floor, or walls.
 const MAX_MESH_TRIANGLES: usize = 48;
@@ -26,10 +20,6 @@ const MAX_WALL_TRIANGLES: usize = 80;
 
 /// The least area of the box around such a mesh, in areas of the box around the world.
 const MIN_WALL_AREA: f32 = 0.02;
-
-/// With so many triangles, the build of the BVH takes three times as long as Embree's and 1.8 times the memory
-/// (`docs/accelerators.md`). Analytic shapes count as well.
-const MAX_PRIMS: usize = 2_000_000;
 
 /// What traces what is not in packets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -70,27 +60,6 @@ impl<'g> HybridAccel<'g> {
         Ok(Self { others, shapes, packets, geometry })
     }
 
-    /// What is fastest for `geometry`: packets beside one of both, or one of both alone.
-    pub fn suiting(geometry: &Geometry) -> AccelKind {
-        let (in_packets, others): (Vec<ShapeId>, Vec<ShapeId>) =
-            geometry.world.iter().partition(|&&id| is_traced_in_packets(geometry, id));
-        let in_packets = in_packets.len();
-        let triangles: usize = others.iter().map(|&id| geometry.shape(id).prim_count()).sum();
-        let bvh = Bvh::is_vectorized()
-            && geometry.instances.is_empty()
-            && others.iter().all(|&id| is_resting_mesh(geometry.shape(id)))
-            && triangles > 0
-            && triangles + in_packets <= MAX_PRIMS;
-        let few = if bvh { 0..=FEW_BESIDE_BVH } else { 1..=FEW };
-        if few.contains(&in_packets) {
-            AccelKind::Hybrid(HybridOptions { bvh })
-        } else if bvh {
-            AccelKind::Bvh(BvhOptions::default())
-        } else {
-            AccelKind::EMBREE
-        }
-    }
-
     /// The closest hit of one ray on the shapes in packets.
     fn intersect_shapes(&self, ray: &Ray) -> Option<Hit> {
         let mut ray = *ray;
@@ -119,13 +88,13 @@ impl<'g> HybridAccel<'g> {
 }
 
 /// Whether a shape of the world is traced in packets.
-fn is_traced_in_packets(geometry: &Geometry, id: ShapeId) -> bool {
+pub(super) fn is_traced_in_packets(geometry: &Geometry, id: ShapeId) -> bool {
     matches!(geometry.shape(id), Shape::Analytic(placed) if has_intervals(&placed.shape))
         && !geometry.cutouts.has_holes(id)
 }
 
 /// Whether a shape is a mesh that does not deform.
-fn is_resting_mesh(shape: &Shape) -> bool {
+pub(super) fn is_resting_mesh(shape: &Shape) -> bool {
     matches!(shape, Shape::Mesh(mesh) if !mesh.is_deforming())
 }
 

@@ -6,6 +6,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use super::bvh::{Bvh, BvhOptions};
+use super::hybrid::{is_resting_mesh, is_traced_in_packets};
 use super::kdtree::{KdTree, KdTreeOptions};
 use super::octree::Octree;
 use super::tree::TwoLevel;
@@ -14,14 +15,25 @@ use super::{
 };
 use crate::error::Result;
 use crate::geometry::Geometry;
+use crate::id::ShapeId;
+
+/// Up to this number of analytic shapes, packets beside Embree are mostly faster (`docs/accelerators.md`).
+const FEW_BESIDE_EMBREE: usize = 16;
+
+/// Up to this number, packets beside the BVH are mostly faster than the BVH for all shapes.
+const FEW_BESIDE_BVH: usize = 128;
+
+/// With so many triangles, the build of the BVH takes three times as long as Embree's and 1.8 times the memory
+/// (`docs/accelerators.md`). Analytic shapes count as well.
+const MAX_PRIMS: usize = 2_000_000;
 
 /// An accelerator with its options. Its name, also when serialized, is `KIND` or `KIND:OPTION+OPTION`;
 /// [`AccelKind::CHOICES`] lists both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum AccelKind {
-    /// [`Packets`](Self::Packets) for scenes of few primitives at rest, [`Hybrid`](Self::Hybrid) for meshes at rest and
-    /// where few analytic shapes stand among others, else Embree.
+    /// [`Packets`](Self::Packets) for scenes of few primitives at rest, [`Hybrid`](Self::Hybrid) or
+    /// [`Bvh`](Self::Bvh) for meshes at rest, `Hybrid` where few analytic shapes stand among others, else Embree.
     #[default]
     Auto,
     /// Embree.
@@ -177,8 +189,7 @@ impl TryFrom<String> for AccelKind {
 /// If Embree reports an error, such as a lack of memory.
 pub fn build(kind: AccelKind, geometry: &Geometry, threads: usize) -> Result<Box<dyn Accelerator + '_>> {
     Ok(match kind {
-        AccelKind::Auto if PacketBvh::suits(geometry) => Box::new(PacketBvh::new(geometry, threads)),
-        AccelKind::Auto => build(HybridAccel::suiting(geometry), geometry, threads)?,
+        AccelKind::Auto => build(fastest(geometry), geometry, threads)?,
         AccelKind::Embree(options) => Box::new(EmbreeAccel::with_options(geometry, threads, options)?),
         AccelKind::Packets => Box::new(PacketBvh::new(geometry, threads)),
         AccelKind::Hybrid(options) => Box::new(HybridAccel::new(geometry, threads, options)?),
@@ -187,6 +198,30 @@ pub fn build(kind: AccelKind, geometry: &Geometry, threads: usize) -> Result<Box
         AccelKind::Octree => Box::new(TwoLevel::<Octree>::new(geometry, &(), threads)),
         AccelKind::Linear => Box::new(LinearAccel::new(geometry)),
     })
+}
+
+/// The accelerator that is mostly fastest for `geometry` (`docs/accelerators.md`).
+fn fastest(geometry: &Geometry) -> AccelKind {
+    if PacketBvh::suits(geometry) {
+        return AccelKind::Packets;
+    }
+    let (in_packets, others): (Vec<ShapeId>, Vec<ShapeId>) =
+        geometry.world.iter().partition(|&&id| is_traced_in_packets(geometry, id));
+    let in_packets = in_packets.len();
+    let triangles: usize = others.iter().map(|&id| geometry.shape(id).prim_count()).sum();
+    let bvh = Bvh::is_vectorized()
+        && geometry.instances.is_empty()
+        && others.iter().all(|&id| is_resting_mesh(geometry.shape(id)))
+        && triangles > 0
+        && triangles + in_packets <= MAX_PRIMS;
+    let few = if bvh { 0..=FEW_BESIDE_BVH } else { 1..=FEW_BESIDE_EMBREE };
+    if few.contains(&in_packets) {
+        AccelKind::Hybrid(HybridOptions { bvh })
+    } else if bvh {
+        AccelKind::Bvh(BvhOptions::default())
+    } else {
+        AccelKind::EMBREE
+    }
 }
 
 #[cfg(test)]
