@@ -3,6 +3,7 @@
 use super::area::{AreaQueue, EmitterQueue};
 use super::environment::{EnvironmentScratch, InfiniteLightSampleRows};
 use super::set::LightChoiceRows;
+use super::tree::LightTreeScratch;
 use super::{EnvironmentMap, Light, LightSample, LightSampleContext, LightSet, MisCompensation, ShadowTarget};
 use crate::color::Rgb;
 use crate::geometry::{Geometry, SpawnPoint};
@@ -68,6 +69,7 @@ impl LightSampleRows {
 /// them at once.
 pub struct LightQueue {
     choices: LightChoiceRows,
+    tree_scratch: LightTreeScratch,
     area: AreaQueue,
     emitters: EmitterQueue,
     sky: SkyQueue,
@@ -79,6 +81,7 @@ impl Default for LightQueue {
     fn default() -> Self {
         Self {
             choices: LightChoiceRows::default(),
+            tree_scratch: LightTreeScratch::default(),
             area: AreaQueue::default(),
             emitters: EmitterQueue::default(),
             sky: SkyQueue::default(),
@@ -151,7 +154,8 @@ impl LightQueue {
         is_wanted: impl Fn(usize) -> bool,
         samples: &mut LightSampleRows,
     ) {
-        context.lights.choose_rows(queries, &is_wanted, context.compensation, &mut self.choices);
+        let Self { choices, tree_scratch, .. } = self;
+        context.lights.choose_rows(queries, &is_wanted, context.compensation, tree_scratch, choices);
         samples.light = self.choices.light;
         for lane in (0..queries.count.min(BATCH)).filter(|&lane| is_wanted(lane)) {
             if self.choices.pmf[lane] > 0.0 {
@@ -178,7 +182,7 @@ impl LightQueue {
         samples: &mut LightSampleRows,
         target_p: &mut DVec3Rows,
     ) {
-        let Self { choices, area, emitters, sky, alone } = self;
+        let Self { choices, area, emitters, sky, alone, .. } = self;
         let pmfs = &choices.pmf;
         area.sample(queries, pmfs, samples, target_p);
         let mut set = |lane: usize, sample: &LightSample| samples.set(lane, sample, pmfs[lane], target_p);

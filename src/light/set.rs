@@ -1,6 +1,6 @@
 //! All lights of a scene, and the sampling of one of them.
 
-use super::tree::{LightSampleContext, LightTree};
+use super::tree::{LightSampleContext, LightTree, LightTreeScratch};
 use super::{Environment, EnvironmentMap, Light, LightQueries, MisCompensation};
 use crate::geometry::Geometry;
 use crate::id::LightId;
@@ -191,23 +191,17 @@ impl LightSet {
         queries: &LightQueries,
         is_wanted: impl Fn(usize) -> bool,
         compensation: MisCompensation,
+        scratch: &mut LightTreeScratch,
         choices: &mut LightChoiceRows,
     ) {
         let distribution = self.distribution(compensation);
         match (&self.tree, &distribution.table) {
             (None, None) => choices.pmf = [0.0; BATCH],
             (None, Some(table)) => vectorize!(choose_from_table(table, queries, choices)),
-            (Some(tree), _) if tree.has_one_node() => {
-                tree.choose_rows(queries, distribution.tree_share, choices);
+            (Some(tree), _) => {
+                tree.choose_rows(queries, is_wanted, distribution.tree_share, scratch, choices);
                 if distribution.tree_share < 1.0 {
                     distribution.choose_at_infinity(queries, choices);
-                }
-            }
-            (Some(_), _) => {
-                for lane in (0..queries.count.min(BATCH)).filter(|&lane| is_wanted(lane)) {
-                    let [u, _, _, digits] = queries.u.of(lane);
-                    let choice = self.choose(&queries.light_context(lane), [u, digits], compensation);
-                    choices.set(lane, choice);
                 }
             }
         }

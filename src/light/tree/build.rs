@@ -4,6 +4,7 @@ use super::node::{Node, WIDTH};
 use super::{LEAF, LightTree, NONE, Place};
 use crate::light::bounds::LightBounds;
 use crate::math::Aabb;
+use std::ops::Range;
 
 /// Bins along an axis.
 const BINS: usize = 12;
@@ -56,18 +57,25 @@ impl LightTree {
         let nowhere = Place { node: NONE, slot: 0 };
         let mut tree = Self { nodes: Vec::new(), node_places: Vec::new(), light_places: vec![nowhere; lights.len()] };
         let count = items.len();
-        tree.add_node(&mut items, 0, count, nowhere, 0);
+        let root = tree.add_node(nowhere);
+        tree.set_node(root, &mut items, 0..count, 0);
         tree.nodes.shrink_to_fit();
         tree.node_places.shrink_to_fit();
         Some(tree)
     }
 
-    /// Adds the node over a range of items, and all below.
-    fn add_node(&mut self, items: &mut [Item], start: usize, end: usize, place: Place, depth: u32) -> u32 {
-        let id = self.nodes.len() as u32;
+    /// Adds an empty node; its index.
+    fn add_node(&mut self, place: Place) -> u32 {
         self.nodes.push(Node::EMPTY);
         self.node_places.push(place);
-        let groups = split_into_children(items, start, end, depth);
+        self.nodes.len() as u32 - 1
+    }
+
+    /// Sets the node over a range of items, and adds all below.
+    fn set_node(&mut self, id: u32, items: &mut [Item], range: Range<usize>, depth: u32) {
+        let mut groups = split_into_children(items, range.start, range.end, depth);
+        // Nodes come first, one after the other.
+        groups.sort_by_key(|group| group.len() == 1);
         for (slot, group) in groups.iter().enumerate() {
             let place = Place { node: id, slot: slot as u32 };
             let child = if group.len() == 1 {
@@ -75,11 +83,14 @@ impl LightTree {
                 self.light_places[light as usize] = place;
                 light | LEAF
             } else {
-                self.add_node(items, group.start, group.end, place, depth + 1)
+                self.add_node(place)
             };
             self.nodes[id as usize].set(slot, &group.bounds, child);
         }
-        id
+        for (slot, group) in groups.iter().enumerate().take_while(|(_, group)| group.len() > 1) {
+            let child = self.nodes[id as usize].child(slot);
+            self.set_node(child, items, group.start..group.end, depth + 1);
+        }
     }
 }
 

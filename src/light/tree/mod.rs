@@ -4,20 +4,24 @@
 //! Nodes have eight children, whose bounds are compared side by side. Where the paper takes several lights from groups
 //! that are near, one light is chosen from the *cut*: near groups are replaced by their children until what is left is
 //! far enough for one estimate to stand for all of it. Against descending straight from the root, the error on a room
-//! with 320 lights halves at a quarter more time. A tree of up to eight lights is one node, and its lights are weighed
-//! for many points at once.
+//! with 320 lights halves at a quarter more time. Many points choose at once, and their nodes take turns. A tree of up
+//! to eight lights is one node: its lights are weighed for a vector of points each.
 
 mod build;
+mod cuts;
 mod node;
+mod pick;
 mod rows;
 #[cfg(test)]
 mod tests;
 
-use crate::math::float::ONE_MINUS_EPSILON;
+pub use rows::LightTreeScratch;
+
 use crate::math::vectorize::vectorize;
 use crate::math::{DVec3, Vec3};
-use arrayvec::ArrayVec;
-use node::{Node, WIDTH};
+use cuts::OneCut;
+use node::Node;
+use pick::total;
 
 /// No node.
 const NONE: u32 = u32::MAX;
@@ -70,46 +74,15 @@ pub(super) struct LightTree {
     light_places: Vec<Place>,
 }
 
-/// The root and near nodes below it, with the importance of those children that are not in the cut themselves.
-#[derive(Default)]
-struct Cut {
-    nodes: ArrayVec<u32, MAX_OPEN>,
-    importances: ArrayVec<[f32; WIDTH], MAX_OPEN>,
-    sums: ArrayVec<f32, MAX_OPEN>,
-    total: f32,
-}
-
 impl LightTree {
-    /// Finds the cut for a point, in an empty one; false where nothing arrives.
-    #[inline(always)]
-    fn find_cut(&self, p: Vec3, n: Vec3, cut: &mut Cut) -> bool {
-        cut.nodes.push(0);
-        let mut i = 0;
-        while i < cut.nodes.len() {
-            let node = &self.nodes[cut.nodes[i] as usize];
-            let mut found = node.importances(p, n);
-            while found.near != 0 {
-                let slot = found.near.trailing_zeros() as usize;
-                found.near &= found.near - 1;
-                let child = node.child(slot);
-                if child & LEAF == 0 && found.of[slot] > 0.0 && cut.nodes.len() < MAX_OPEN {
-                    found.of[slot] = 0.0;
-                    cut.nodes.push(child);
-                }
-            }
-            let sum = found.of.iter().sum();
-            cut.importances.push(found.of);
-            cut.sums.push(sum);
-            cut.total += sum;
-            i += 1;
-        }
-        cut.total > 0.0
-    }
-
     /// A light, `u` in `[0, 1)`; `None` where nothing arrives.
     #[inline]
     pub fn choose(&self, from: &LightSampleContext, u: f64) -> Option<TreeChoice> {
-        vectorize!(choose(self, from.p.as_vec3(), from.n, u))
+        let mut cut = OneCut::default();
+        cut.push(from.p.as_vec3(), from.n, u);
+        let mut found = TreeChoice { light: 0, pmf: 0.0 };
+        vectorize!(cut.choose(self, |_, choice| found = choice));
+        (found.pmf > 0.0).then_some(found)
     }
 
     /// The probability with which [`choose`](Self::choose) finds a light.
@@ -127,86 +100,31 @@ impl LightTree {
 }
 
 #[inline(always)]
-fn choose(tree: &LightTree, p: Vec3, n: Vec3, u: f64) -> Option<TreeChoice> {
-    let mut cut = Cut::default();
-    if !tree.find_cut(p, n, &mut cut) {
-        return None;
-    }
-    let open = pick(&cut.sums, u * f64::from(cut.total))?;
-    let importances = &cut.importances[open.index];
-    let mut picked = pick(importances, open.within)?;
-    let mut pmf = importances[picked.index] / cut.total;
-    let mut child = tree.nodes[cut.nodes[open.index] as usize].child(picked.index);
-    while child & LEAF == 0 {
-        let node = &tree.nodes[child as usize];
-        let importances = node.importances(p, n).of;
-        let total = total(&importances)?;
-        picked = pick(&importances, picked.share() * f64::from(total))?;
-        pmf *= importances[picked.index] / total;
-        child = node.child(picked.index);
-    }
-    Some(TreeChoice { light: child & !LEAF, pmf })
-}
-
-#[inline(always)]
 fn pmf(tree: &LightTree, p: Vec3, n: Vec3, light: u32) -> f32 {
     let mut place = tree.light_places[light as usize];
     if place.node == NONE {
         return 0.0;
     }
-    let mut cut = Cut::default();
-    if !tree.find_cut(p, n, &mut cut) {
+    let mut cut = OneCut::default();
+    cut.push(p, n, 0.0);
+    cut.expand(tree);
+    let all = cut.total(0);
+    if all <= 0.0 {
         return 0.0;
     }
     let mut pmf = 1.0;
     // Up to the cut, which holds the root.
     loop {
-        if let Some(open) = cut.nodes.iter().position(|&node| node == place.node) {
-            return pmf * cut.importances[open][place.slot as usize] / cut.total;
+        let in_cut = cut.find(place.node);
+        let importances = in_cut.copied().unwrap_or_else(|| tree.nodes[place.node as usize].importances(p, n).of);
+        let total = total(&importances);
+        if total <= 0.0 {
+            return 0.0;
         }
-        let importances = tree.nodes[place.node as usize].importances(p, n).of;
-        let Some(total) = total(&importances) else { return 0.0 };
         pmf *= importances[place.slot as usize] / total;
+        if in_cut.is_some() {
+            return pmf * (f64::from(total) / all) as f32;
+        }
         place = tree.node_places[place.node as usize];
     }
-}
-
-/// The sum if something can be chosen in proportion to it.
-#[inline(always)]
-fn total(importances: &[f32; WIDTH]) -> Option<f32> {
-    let total = importances.iter().sum();
-    (total > 0.0).then_some(total)
-}
-
-/// An entry found by [`pick`].
-#[derive(Clone, Copy)]
-struct Picked {
-    index: usize,
-    /// How far into the entry, from 0 to below `size`.
-    within: f64,
-    size: f64,
-}
-
-impl Picked {
-    /// How far into the entry, in `[0, 1)`.
-    #[inline(always)]
-    fn share(&self) -> f64 {
-        self.within / self.size
-    }
-}
-
-/// The entry in which `x` falls if all are laid end to end; never an entry of zero. `None` if all are.
-#[inline(always)]
-fn pick(entries: &[f32], x: f64) -> Option<Picked> {
-    let mut lower = 0.0;
-    let mut found = None;
-    for (index, &entry) in entries.iter().enumerate() {
-        let size = f64::from(entry);
-        // Rounding of the sum may put x a little behind the last entry: it then keeps that.
-        if size > 0.0 && (found.is_none() || x >= lower) {
-            found = Some(Picked { index, within: (x - lower).min(size * f64::from(ONE_MINUS_EPSILON)), size });
-        }
-        lower += size;
-    }
-    found
 }

@@ -1,6 +1,6 @@
 //! Nodes: bounds of eight children in lanes, and the estimate of what each gives at a point.
 
-use super::NONE;
+use super::{LEAF, NONE};
 use crate::light::bounds::LightBounds;
 use crate::math::Vec3;
 
@@ -42,6 +42,7 @@ pub(super) struct Node {
     intensity: Lanes,
     /// A node, or [`LEAF`](super::LEAF) and a light.
     child: [u32; WIDTH],
+    first_node: u32,
 }
 
 /// What is known of one child.
@@ -60,8 +61,20 @@ pub(super) struct ChildBounds {
 pub(super) struct Importances {
     /// Estimates of the irradiance, up to a common factor; zero only where none can arrive.
     pub of: [f32; WIDTH],
-    /// A bit for each child that is so near that one estimate for all of it is a poor one.
-    pub near: u32,
+    /// The same without near nodes.
+    pub without_near_nodes: [f32; WIDTH],
+    /// 1 for each child that is a node, of which something arrives, and so near that one estimate for all of it is a
+    /// poor one; 0 for others.
+    near: [u8; WIDTH],
+}
+
+impl Importances {
+    /// A bit for each near node.
+    #[inline(always)]
+    pub fn near_nodes(&self) -> u32 {
+        // The product moves bit `8 i` to bit `56 + i`.
+        (u64::from_le_bytes(self.near).wrapping_mul(0x0102_0408_1020_4080) >> 56) as u32
+    }
 }
 
 impl Node {
@@ -74,6 +87,7 @@ impl Node {
         cos_reach: [0.0; WIDTH],
         intensity: [0.0; WIDTH],
         child: [NONE; WIDTH],
+        first_node: NONE,
     };
 
     /// Sets a child.
@@ -91,6 +105,9 @@ impl Node {
         self.cos_reach[slot] = bounds.cone.reach.cos() - SLACK;
         self.intensity[slot] = if bounds.two_sided { -bounds.intensity } else { bounds.intensity };
         self.child[slot] = child;
+        if child & LEAF == 0 {
+            self.first_node = self.first_node.min(child);
+        }
     }
 
     /// A node, or [`LEAF`](super::LEAF) and a light.
@@ -103,6 +120,12 @@ impl Node {
     #[inline(always)]
     pub fn count(&self) -> usize {
         self.child.iter().position(|&child| child == NONE).unwrap_or(WIDTH)
+    }
+
+    /// The first of the children that are nodes, one after the other, or none.
+    #[inline(always)]
+    pub fn first_node(&self) -> u32 {
+        self.first_node
     }
 
     /// What is known of a child.
@@ -123,19 +146,23 @@ impl Node {
     /// What each child gives at `p` on a surface with the normal `n`, or (if that is zero) from any side.
     #[inline(always)]
     pub fn importances(&self, p: Vec3, n: Vec3) -> Importances {
-        let (mut of, mut near) = ([0.0; WIDTH], [0; WIDTH]);
+        let (mut of, mut without_near_nodes, mut near) = ([0.0; WIDTH], [0.0; WIDTH], [0; WIDTH]);
         let from_any_side = n == Vec3::ZERO;
         for i in 0..WIDTH {
-            (of[i], near[i]) = self.bounds(i).importance(p, n, from_any_side);
+            let (importance, is_near) = self.bounds(i).importance(p, n, from_any_side);
+            of[i] = importance;
+            let is_near_node = is_near & (importance > 0.0) & (self.child[i] & LEAF == 0);
+            without_near_nodes[i] = if is_near_node { 0.0 } else { importance };
+            near[i] = u8::from(is_near_node);
         }
-        Importances { of, near: (0..WIDTH).fold(0, |bits, i| bits | near[i] << i) }
+        Importances { of, without_near_nodes, near }
     }
 }
 
 impl ChildBounds {
     /// What the child gives, as [`Importances`] has it, and whether it is near; without branches.
     #[inline(always)]
-    pub fn importance(&self, p: Vec3, n: Vec3, from_any_side: bool) -> (f32, u32) {
+    pub fn importance(&self, p: Vec3, n: Vec3, from_any_side: bool) -> (f32, bool) {
         let [x, y, z] = [self.center.x - p.x, self.center.y - p.y, self.center.z - p.z];
         let (inverse_radius, intensity) = (self.inverse_radius, self.intensity);
         let distance_squared = larger(x * x + y * y + z * z, f32::MIN_POSITIVE);
@@ -168,7 +195,7 @@ impl ChildBounds {
         let arrival = if cos_arrival + sin_bound < -SLACK { 0.0 } else { mean(cos_arrival) };
 
         let inverse_radius_squared = inverse_radius * inverse_radius;
-        let near = u32::from(distance_squared * inverse_radius_squared < NEAR);
+        let near = distance_squared * inverse_radius_squared < NEAR;
         let inverse_square = smaller(inverse_distance * inverse_distance, 2.0 * inverse_radius_squared);
         (smaller(intensity.abs() * emission * arrival * inverse_square, LARGEST), near)
     }

@@ -1,6 +1,8 @@
-//! Choices for many points at once, from a tree of one node.
+//! Choices of lights for a batch of vertices.
 
-use super::node::{Node, WIDTH};
+use super::cuts::BatchCuts;
+use super::node::Node;
+use super::pick::{Picked, pick, pick_of_two};
 use super::{LEAF, LightTree};
 use crate::light::LightQueries;
 use crate::light::set::{LightChoiceRows, with_digits};
@@ -9,56 +11,86 @@ use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::rows::{BATCH, Row, whole_vectors};
 use crate::math::vectorize::vectorize;
 
-impl LightTree {
-    /// Whether all lights are children of the root.
-    pub fn has_one_node(&self) -> bool {
-        self.nodes.len() == 1
-    }
+/// Memory of [`LightTree::choose_rows`].
+#[derive(Default)]
+pub struct LightTreeScratch {
+    /// Only where a tree has more than one node.
+    cuts: Option<Box<BatchCuts>>,
+    /// Lanes of the points of the cuts.
+    lanes: Vec<usize>,
+}
 
-    /// [`choose`](Self::choose) for many points, by numbers over `share`; probabilities are multiplied by it, and 0
-    /// where nothing arrives. Of a tree of one node.
-    pub fn choose_rows(&self, queries: &LightQueries, share: f32, choices: &mut LightChoiceRows) {
-        vectorize!(choose(&self.nodes[0], queries, share, choices));
+impl LightTree {
+    /// [`choose`](Self::choose) for the vertices that are wanted, by numbers over `share`; probabilities are multiplied
+    /// by it, and 0 where nothing arrives. Other lanes may be set too.
+    pub fn choose_rows(
+        &self,
+        queries: &LightQueries,
+        is_wanted: impl Fn(usize) -> bool,
+        share: f32,
+        scratch: &mut LightTreeScratch,
+        choices: &mut LightChoiceRows,
+    ) {
+        if let [node] = &self.nodes[..] {
+            match node.count() {
+                ..=2 => vectorize!(choose(node, queries, share, pick_of_two, choices)),
+                _ => vectorize!(choose(node, queries, share, pick, choices)),
+            }
+            return;
+        }
+        let LightTreeScratch { cuts, lanes } = scratch;
+        let cuts = cuts.get_or_insert_default();
+        cuts.clear();
+        lanes.clear();
+        choices.pmf = [0.0; BATCH];
+        for lane in (0..queries.count.min(BATCH)).filter(|&lane| is_wanted(lane)) {
+            let [u, _, _, digits] = queries.u.of(lane);
+            let u = with_digits([u, digits]) / f64::from(share);
+            if u < 1.0 {
+                cuts.push(queries.points.get(lane).as_vec3(), queries.normals.get(lane), u);
+                lanes.push(lane);
+            }
+        }
+        vectorize!(cuts.choose(self, |point, choice| {
+            let lane = lanes[point];
+            choices.light[lane] = choice.light;
+            choices.pmf[lane] = choice.pmf * share;
+        }));
     }
 }
 
+/// Chooses among the children of a root, which are all lights: up to `CHILDREN` of them.
 #[inline(always)]
-fn choose(node: &Node, queries: &LightQueries, share: f32, choices: &mut LightChoiceRows) {
+fn choose<const CHILDREN: usize>(
+    node: &Node,
+    queries: &LightQueries,
+    share: f32,
+    pick: impl Fn(&[f32; CHILDREN], f64) -> Picked,
+    choices: &mut LightChoiceRows,
+) {
     let (lights, pmfs) = (&mut choices.light, &mut choices.pmf);
     let count = whole_vectors(queries.count);
-    let mut importances: [Row; WIDTH] = [[0.0; BATCH]; WIDTH];
-    let mut totals: Row = [0.0; BATCH];
-    let children = node.count();
-    for (slot, importances) in importances.iter_mut().enumerate().take(children) {
+    let mut importances: [Row; CHILDREN] = [[0.0; BATCH]; CHILDREN];
+    for (slot, importances) in importances.iter_mut().enumerate().take(node.count()) {
         let bounds = node.bounds(slot);
-        for i in 0..count {
+        for (i, importance) in importances.iter_mut().enumerate().take(count) {
             let (p, n) = (queries.points.get(i).as_vec3(), queries.normals.get(i));
-            importances[i] = bounds.importance(p, n, n == Vec3::ZERO).0;
-            totals[i] += importances[i];
-        }
-    }
-    let (mut x, mut lower): (Row<f64>, Row<f64>) = ([0.0; BATCH], [0.0; BATCH]);
-    for i in 0..count {
-        let [u, _, _, v] = queries.u.of(i);
-        let total = f64::from(totals[i]);
-        let at = with_digits([u, v]) / f64::from(share) * total;
-        let last = total * f64::from(ONE_MINUS_EPSILON);
-        x[i] = if at < last { at } else { last };
-        pmfs[i] = 0.0;
-    }
-    for (slot, importances) in importances.iter().enumerate().take(children) {
-        let light = node.child(slot) & !LEAF;
-        for i in 0..count {
-            let importance = importances[i];
-            // As `pick` does.
-            let is_picked = (importance > 0.0) & ((pmfs[i] == 0.0) | (x[i] >= lower[i]));
-            pmfs[i] = if is_picked { importance } else { pmfs[i] };
-            lights[i] = if is_picked { light } else { lights[i] };
-            lower[i] += f64::from(importance);
+            *importance = bounds.importance(p, n, n == Vec3::ZERO).0;
         }
     }
     for i in 0..count {
-        let pmf = pmfs[i] / totals[i] * share;
-        pmfs[i] = if totals[i] > 0.0 { pmf } else { 0.0 };
+        let mut of = [0.0; CHILDREN];
+        for (of, row) in of.iter_mut().zip(&importances) {
+            *of = row[i];
+        }
+        let [u, _, _, digits] = queries.u.of(i);
+        let u = with_digits([u, digits]) / f64::from(share);
+        let last = f64::from(ONE_MINUS_EPSILON);
+        let picked = pick(&of, if u < last { u } else { last });
+        lights[i] = picked.slot;
+        pmfs[i] = picked.pmf * share;
+    }
+    for light in &mut lights[..count] {
+        *light = node.child(*light as usize) & !LEAF;
     }
 }
