@@ -114,15 +114,22 @@ fn few_analytic_shapes_beside_many_triangles_are_traced_in_packets() {
         build(AccelKind::Auto, &world(shapes), 1).expect("it builds").description()
     };
     // Meshes at rest are in the BVH, where the machine has the instructions that make it fast; there more shapes are
-    // few, and with many all are in the BVH.
+    // few, and with many all but floors and walls are in the BVH.
     let is_bvh = std::arch::is_x86_feature_detected!("avx2");
-    let few = if is_bvh { 128 } else { 16 };
+    let few = if is_bvh { 512 } else { 16 };
     assert!(beside(1, &mesh).contains("for 1 shapes") && beside(few, &mesh).contains(&format!("for {few} shapes")));
     for count in [0, few + 1] {
         let description = beside(count, &mesh);
         assert!(!description.contains("packets"), "{description}");
         assert_eq!(description.starts_with("BVH"), is_bvh);
         assert_eq!(description.starts_with("Embree"), !is_bvh);
+    }
+    let corners = [[-9.0, -1.0], [9.0, -1.0], [9.0, 1.0], [-9.0, 1.0]].map(|[x, z]| [x, -1.0, 9.0 * z]);
+    let floor = Mesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]], None, None).expect("it is valid");
+    for (count, in_packets) in [(64, 65), (65, 1)].into_iter().filter(|_| is_bvh) {
+        let shapes = std::iter::repeat_n(quad.clone(), count).chain([mesh.clone(), Shape::Mesh(floor.clone())]);
+        let description = build(AccelKind::Auto, &world(shapes.collect()), 1).expect("it builds").description();
+        assert!(description.contains(&format!("for {in_packets} shapes")), "{description}");
     }
     let inside = instances(vec![quad.clone(), mesh], &[transform(rng.rotation(), rng.cube())]);
     assert!(build(AccelKind::Auto, &inside, 1).expect("it builds").description().starts_with("Embree"));

@@ -1,5 +1,6 @@
 //! Packets for analytic shapes of the world, and Embree or the BVH for all else: a few shapes cost less that way than a
-//! second hierarchy in Embree with a callback for each. Beside the BVH, floors and walls are in packets too.
+//! second hierarchy in Embree with a callback for each. Beside the BVH, floors and walls are in packets too, and many
+//! analytic shapes are not.
 
 use super::bvh::{Bvh, BvhOptions};
 use super::embree::{EmbreeAccel, EmbreeOptions};
@@ -21,6 +22,12 @@ const MAX_WALL_TRIANGLES: usize = 80;
 /// The least area of the box around such a mesh, in areas of the box around the world.
 const MIN_WALL_AREA: f32 = 0.02;
 
+/// The most analytic shapes in packets beside the BVH: more of them are traced faster in it.
+const MAX_SHAPES: usize = 512;
+
+/// The same where floors or walls are in packets, which rays that enter a room all meet.
+const MAX_SHAPES_BESIDE_WALLS: usize = 64;
+
 /// What traces what is not in packets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct HybridOptions {
@@ -29,7 +36,7 @@ pub struct HybridOptions {
 }
 
 /// A hierarchy for packets over the spheres, cylinders, disks and quads of the world that have no holes, and Embree or
-/// the BVH.
+/// the BVH. Beside the BVH, packets have up to 512 of them, 64 where there are floors or walls, or none.
 pub struct HybridAccel<'g> {
     others: Box<dyn Accelerator + 'g>,
     /// In packets.
@@ -46,8 +53,15 @@ impl<'g> HybridAccel<'g> {
     /// As [`EmbreeAccel::new`].
     pub fn new(geometry: &'g Geometry, threads: usize, options: HybridOptions) -> Result<Self> {
         let walls = if options.bvh { walls(geometry) } else { Vec::new() };
+        let max_shapes = match options.bvh {
+            false => usize::MAX,
+            true if walls.is_empty() => MAX_SHAPES,
+            true => MAX_SHAPES_BESIDE_WALLS,
+        };
+        let is_analytic = |id: ShapeId| is_traced_in_packets(geometry, id);
+        let are_few = geometry.world.iter().filter(|&&id| is_analytic(id)).count() <= max_shapes;
         let (mut shapes, mut others): (Vec<_>, Vec<_>) =
-            geometry.world.iter().partition(|&&id| is_traced_in_packets(geometry, id) || walls.contains(&id));
+            geometry.world.iter().partition(|&&id| are_few && is_analytic(id) || walls.contains(&id));
         let packets = Hierarchy::new(geometry, &shapes, &geometry.bounds());
         if packets.is_none() {
             others.append(&mut shapes);

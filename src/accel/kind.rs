@@ -20,9 +20,6 @@ use crate::id::ShapeId;
 /// Up to this number of analytic shapes, packets beside Embree are mostly faster (`docs/accelerators.md`).
 const FEW_BESIDE_EMBREE: usize = 16;
 
-/// Up to this number, packets beside the BVH are mostly faster than the BVH for all shapes.
-const FEW_BESIDE_BVH: usize = 128;
-
 /// With so many triangles, the build of the BVH takes three times as long as Embree's and 1.8 times the memory
 /// (`docs/accelerators.md`). Analytic shapes count as well.
 const MAX_PRIMS: usize = 2_000_000;
@@ -80,8 +77,8 @@ impl AccelKind {
         (
             "auto",
             "packets for at most 40 primitives beside spheres and cylinders, at rest, without holes; without \
-             instances and up to 2 million primitives, hybrid:bvh for meshes at rest beside at most 128 spheres, \
-             cylinders, disks and quads, bvh beside more; hybrid for at most 16 of these beside others; else embree",
+             instances and up to 2 million primitives, hybrid:bvh for meshes at rest beside spheres, cylinders, disks \
+             and quads; hybrid for at most 16 of these beside others; else embree",
         ),
         ("embree", "Embree: fastest to build, for any scene; build quality medium, robust"),
         ("embree:low", "built faster, traced slower"),
@@ -90,7 +87,11 @@ impl AccelKind {
         ("embree:compact", "less memory, traced slower"),
         ("packets", "bounding volume hierarchy traversed by up to 16 rays at once: fastest for few primitives"),
         ("hybrid", "embree, with packets for spheres, cylinders, disks and quads that have no holes"),
-        ("hybrid:bvh", "bvh in place of embree, and packets for floors and walls too"),
+        (
+            "hybrid:bvh",
+            "bvh in place of embree, and packets for floors and walls too, but not for more than 512 shapes (64 beside \
+             floors and walls)",
+        ),
         ("bvh", "bounding volume hierarchy: binned surface area heuristic, eight boxes a node, SIMD"),
         ("bvh:binary", "two boxes a node, no SIMD"),
         ("kdtree", "kd-tree: surface area heuristic with a bonus for empty space"),
@@ -214,11 +215,8 @@ fn fastest(geometry: &Geometry) -> AccelKind {
         && others.iter().all(|&id| is_resting_mesh(geometry.shape(id)))
         && triangles > 0
         && triangles + in_packets <= MAX_PRIMS;
-    let few = if bvh { 0..=FEW_BESIDE_BVH } else { 1..=FEW_BESIDE_EMBREE };
-    if few.contains(&in_packets) {
+    if bvh || (1..=FEW_BESIDE_EMBREE).contains(&in_packets) {
         AccelKind::Hybrid(HybridOptions { bvh })
-    } else if bvh {
-        AccelKind::Bvh(BvhOptions::default())
     } else {
         AccelKind::EMBREE
     }
