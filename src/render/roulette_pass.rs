@@ -9,7 +9,8 @@ use super::TILE_SIZE;
 use super::tile_renderer::{TileRenderer, TileWorkspace};
 use crate::integrator::{ContinuationGrid, PilotRecords, RayCounts, dimensions};
 use crate::math::Vec2;
-use crate::math::rows::Row;
+use crate::math::rows::{BATCH, Row};
+use crate::math::vectorize::vectorize;
 use crate::sampling::PixelSeed;
 
 /// Pilot pixels, by pixel of the picture.
@@ -140,25 +141,49 @@ struct PixelScales {
     /// Columns and rows.
     size: [u32; 2],
     cells_per_pixel: Vec2,
-    scales: Vec<f32>,
+    /// By cell: its own, and those of the cells on its right, below, and below on the right; at the edge, those within.
+    scales: Vec<[f32; 4]>,
+}
+
+/// Cells left of and above pixels, and how far from the one to the next pixels are.
+struct CellRows {
+    cell: Row<u32>,
+    x: Row,
+    y: Row,
 }
 
 impl PixelScales {
+    fn new(size: [u32; 2], cells_per_pixel: Vec2, scales: &[f32]) -> Self {
+        let [columns, rows] = size.map(|count| count as usize);
+        let scale = |x: usize, y: usize| scales[y.min(rows - 1) * columns + x.min(columns - 1)];
+        let with_neighbours =
+            |(x, y): (usize, usize)| [scale(x, y), scale(x + 1, y), scale(x, y + 1), scale(x + 1, y + 1)];
+        let cells = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
+        Self { size, cells_per_pixel, scales: cells.map(with_neighbours).collect() }
+    }
+
     /// Between the centres of cells.
-    #[inline(always)]
-    fn at(&self, [x, y]: [u32; 2]) -> f32 {
-        let [last_x, last_y] = self.size.map(|count| (count - 1) as f32);
+    fn set(&self, pixels: &[[u32; 2]], scales: &mut Row) {
+        let mut cells = CellRows { cell: [0; BATCH], x: [0.0; BATCH], y: [0.0; BATCH] };
+        vectorize!(find_cells(self.size, self.cells_per_pixel, pixels, &mut cells));
+        for (i, scale) in scales.iter_mut().enumerate().take(pixels.len()) {
+            let [a, b, c, d] = self.scales[cells.cell[i] as usize];
+            let (above, below) = (a + cells.x[i] * (b - a), c + cells.x[i] * (d - c));
+            *scale = above + cells.y[i] * (below - above);
+        }
+    }
+}
+
+#[inline(always)]
+fn find_cells(size: [u32; 2], cells_per_pixel: Vec2, pixels: &[[u32; 2]], cells: &mut CellRows) {
+    let [last_x, last_y] = size.map(|count| (count - 1) as f32);
+    for (i, &[x, y]) in pixels.iter().enumerate().take(BATCH) {
         // Beyond the left and the upper edge of the view coordinates wrap.
-        let at = |x: u32, scale: f32, last: f32| ((x as i32 as f32 + 0.5) * scale - 0.5).clamp(0.0, last);
-        let (x, y) = (at(x, self.cells_per_pixel.x, last_x), at(y, self.cells_per_pixel.y, last_y));
-        let (column, row) = (x as usize, y as usize);
-        let (fx, fy) = (x - column as f32, y - row as f32);
-        let columns = self.size[0] as usize;
-        let right = usize::from(x < last_x);
-        let below = if y < last_y { columns } else { 0 };
-        let first = row * columns + column;
-        let of_row = |i: usize| self.scales[i] + fx * (self.scales[i + right] - self.scales[i]);
-        of_row(first) + fy * (of_row(first + below) - of_row(first))
+        let x = ((x as i32 as f32 + 0.5) * cells_per_pixel.x - 0.5).clamp(0.0, last_x);
+        let y = ((y as i32 as f32 + 0.5) * cells_per_pixel.y - 0.5).clamp(0.0, last_y);
+        let (column, row) = (x as i32, y as i32);
+        cells.cell[i] = (row * size[0] as i32 + column) as u32;
+        (cells.x[i], cells.y[i]) = (x - column as f32, y - row as f32);
     }
 }
 
@@ -231,14 +256,12 @@ impl RouletteEstimates {
         continuations.scale(SURVIVAL_SCALE * (rays / variance.max(f64::MIN_POSITIVE)).sqrt().min(1e6) as f32);
         let size = grid.size.map(|side| side / CELL_SIDE);
         let cells_per_pixel = Vec2::new(size[0] as f32 / grid.view[0] as f32, size[1] as f32 / grid.view[1] as f32);
-        Some(Self { continuations, pixels: PixelScales { size, cells_per_pixel, scales }, light_samples })
+        Some(Self { continuations, pixels: PixelScales::new(size, cells_per_pixel, &scales), light_samples })
     }
 
     /// Sets what roulette multiplies the throughputs of the paths of pixels by.
     pub fn set_scales(&self, pixels: &[[u32; 2]], scales: &mut Row) {
-        for (scale, &pixel) in scales.iter_mut().zip(pixels) {
-            *scale = self.pixels.at(pixel);
-        }
+        self.pixels.set(pixels, scales);
     }
 }
 
@@ -326,11 +349,13 @@ mod tests {
 
     #[test]
     fn scales_are_those_of_cells_at_their_centres_and_lie_between_elsewhere() {
-        let pixels =
-            PixelScales { size: [2, 2], cells_per_pixel: Vec2::new(0.2, 0.2), scales: vec![1.0, 2.0, 3.0, 4.0] };
-        assert_eq!([[2, 2], [7, 2], [2, 7], [7, 7]].map(|at| pixels.at(at)), [1.0, 2.0, 3.0, 4.0]);
-        assert!((pixels.at([4, 2]) - 1.4).abs() < 1e-6 && (pixels.at([2, 4]) - 1.8).abs() < 1e-6);
-        assert_eq!([[u32::MAX, 0], [100, 100], [0, 100]].map(|at| pixels.at(at)), [1.0, 4.0, 3.0]);
+        let scales = PixelScales::new([2, 2], Vec2::new(0.2, 0.2), &[1.0, 2.0, 3.0, 4.0]);
+        let mut of_pixels = [0.0; BATCH];
+        let pixels = [[2, 2], [7, 2], [2, 7], [7, 7], [4, 2], [2, 4], [u32::MAX, 0], [100, 100], [0, 100]];
+        scales.set(&pixels, &mut of_pixels);
+        for (found, expected) in of_pixels.into_iter().zip([1.0, 2.0, 3.0, 4.0, 1.4, 1.8, 1.0, 4.0, 3.0]) {
+            assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+        }
     }
 
     #[test]
