@@ -12,14 +12,8 @@ pub const WIDTH: usize = 16;
 /// no lanes to be computed one by one; what they compute beyond the count is not used.
 #[inline(always)]
 pub fn whole_vectors(count: usize) -> usize {
-    whole_vectors_of::<BATCH>(count)
-}
-
-/// [`whole_vectors`] of rows of `LANES`, a multiple of [`WIDTH`].
-#[inline(always)]
-pub fn whole_vectors_of<const LANES: usize>(count: usize) -> usize {
     // The compiler sees that it is a multiple.
-    count.min(LANES).div_ceil(WIDTH) * WIDTH
+    count.min(BATCH).div_ceil(WIDTH) * WIDTH
 }
 
 /// One number per lane.

@@ -7,6 +7,7 @@
 //! with 320 lights halves at a quarter more time. Many points choose at once, and their nodes take turns. A tree of up
 //! to eight lights is one node: its lights are weighed for a vector of points each.
 
+mod batch;
 mod build;
 mod cuts;
 mod node;
@@ -17,11 +18,12 @@ mod tests;
 
 pub use rows::LightTreeScratch;
 
+use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::vectorize::vectorize;
 use crate::math::{DVec3, Vec3};
 use cuts::OneCut;
-use node::Node;
-use pick::total;
+use node::{Node, WIDTH};
+use pick::{pick, total};
 
 /// No node.
 const NONE: u32 = u32::MAX;
@@ -78,11 +80,7 @@ impl LightTree {
     /// A light, `u` in `[0, 1)`; `None` where nothing arrives.
     #[inline]
     pub fn choose(&self, from: &LightSampleContext, u: f64) -> Option<TreeChoice> {
-        let mut cut = OneCut::default();
-        cut.push(from.p.as_vec3(), from.n, u);
-        let mut found = TreeChoice { light: 0, pmf: 0.0 };
-        vectorize!(cut.choose(self, |_, choice| found = choice));
-        (found.pmf > 0.0).then_some(found)
+        vectorize!(choose(self, from.p.as_vec3(), from.n, u))
     }
 
     /// The probability with which [`choose`](Self::choose) finds a light.
@@ -100,31 +98,59 @@ impl LightTree {
 }
 
 #[inline(always)]
+fn choose(tree: &LightTree, p: Vec3, n: Vec3, u: f64) -> Option<TreeChoice> {
+    let u = u.min(f64::from(ONE_MINUS_EPSILON));
+    let (mut node, mut importances, mut u, mut pmf) = if tree.nodes.len() == 1 {
+        (0, tree.nodes[0].importances(p, n).of, u, 1.0)
+    } else {
+        let mut cut = OneCut::default();
+        cut.push(p, n, u);
+        cut.expand(tree);
+        let picked = cut.pick();
+        (cut.nodes[picked.i], cut.importances[picked.i], picked.share, picked.pmf)
+    };
+    loop {
+        let picked = pick(&importances, u);
+        pmf *= picked.pmf;
+        if pmf <= 0.0 {
+            return None;
+        }
+        node = tree.nodes[node as usize].child(picked.slot as usize);
+        if node & LEAF != 0 {
+            return Some(TreeChoice { light: node & !LEAF, pmf });
+        }
+        (importances, u) = (tree.nodes[node as usize].importances(p, n).of, picked.share);
+    }
+}
+
+#[inline(always)]
 fn pmf(tree: &LightTree, p: Vec3, n: Vec3, light: u32) -> f32 {
-    let mut place = tree.light_places[light as usize];
-    if place.node == NONE {
+    let Place { mut node, mut slot } = tree.light_places[light as usize];
+    if node == NONE {
         return 0.0;
+    }
+    if tree.nodes.len() == 1 {
+        return pmf_of_child(&tree.nodes[0].importances(p, n).of, slot);
     }
     let mut cut = OneCut::default();
     cut.push(p, n, 0.0);
     cut.expand(tree);
-    let all = cut.total(0);
-    if all <= 0.0 {
-        return 0.0;
-    }
     let mut pmf = 1.0;
     // Up to the cut, which holds the root.
     loop {
-        let in_cut = cut.find(place.node);
-        let importances = in_cut.copied().unwrap_or_else(|| tree.nodes[place.node as usize].importances(p, n).of);
-        let total = total(&importances);
-        if total <= 0.0 {
-            return 0.0;
+        if let Some(importances) = cut.find(node) {
+            let all = cut.totals[0];
+            let of_node = if all > 0.0 { (f64::from(total(importances)) / all) as f32 } else { 0.0 };
+            return pmf * pmf_of_child(importances, slot) * of_node;
         }
-        pmf *= importances[place.slot as usize] / total;
-        if in_cut.is_some() {
-            return pmf * (f64::from(total) / all) as f32;
-        }
-        place = tree.node_places[place.node as usize];
+        pmf *= pmf_of_child(&tree.nodes[node as usize].importances(p, n).of, slot);
+        Place { node, slot } = tree.node_places[node as usize];
     }
+}
+
+/// The probability with which [`pick`] finds a child.
+#[inline(always)]
+fn pmf_of_child(importances: &[f32; WIDTH], slot: u32) -> f32 {
+    let total = total(importances);
+    if total > 0.0 { importances[slot as usize] / total } else { 0.0 }
 }

@@ -1,6 +1,6 @@
 //! Choices of lights for a batch of vertices.
 
-use super::cuts::BatchCuts;
+use super::batch::BatchCuts;
 use super::node::Node;
 use super::pick::{Picked, pick, pick_of_two};
 use super::{LEAF, LightTree};
@@ -15,7 +15,7 @@ use crate::math::vectorize::vectorize;
 #[derive(Default)]
 pub struct LightTreeScratch {
     /// Only where a tree has more than one node.
-    cuts: Option<Box<BatchCuts>>,
+    batch: Option<Box<BatchCuts>>,
     /// Lanes of the points of the cuts.
     lanes: Vec<usize>,
 }
@@ -38,20 +38,20 @@ impl LightTree {
             }
             return;
         }
-        let LightTreeScratch { cuts, lanes } = scratch;
-        let cuts = cuts.get_or_insert_default();
-        cuts.clear();
+        let LightTreeScratch { batch, lanes } = scratch;
+        let batch = batch.get_or_insert_default();
+        batch.cuts.clear();
         lanes.clear();
         choices.pmf = [0.0; BATCH];
         for lane in (0..queries.count.min(BATCH)).filter(|&lane| is_wanted(lane)) {
             let [u, _, _, digits] = queries.u.of(lane);
             let u = with_digits([u, digits]) / f64::from(share);
             if u < 1.0 {
-                cuts.push(queries.points.get(lane).as_vec3(), queries.normals.get(lane), u);
+                batch.cuts.push(queries.points.get(lane).as_vec3(), queries.normals.get(lane), u);
                 lanes.push(lane);
             }
         }
-        vectorize!(cuts.choose(self, |point, choice| {
+        vectorize!(batch.choose(self, |point, choice| {
             let lane = lanes[point];
             choices.light[lane] = choice.light;
             choices.pmf[lane] = choice.pmf * share;
