@@ -148,7 +148,7 @@ fn pmf(tree: &LightTree, p: Vec3, n: Vec3, light: u32) -> f32 {
     }
 }
 
-/// The probability with which [`pick`] finds a child.
+/// The probability with which [`pick()`] finds a child.
 #[inline(always)]
 fn pmf_of_child(importances: &[f32; WIDTH], slot: u32) -> f32 {
     let total = total(importances);

@@ -40,7 +40,7 @@ pub(super) struct Node {
     cos_reach: Lanes,
     /// Zero where there is no child. Negative for a child that emits both ways.
     intensity: Lanes,
-    /// A node, or [`LEAF`](super::LEAF) and a light.
+    /// A node, or [`LEAF`] and a light.
     child: [u32; WIDTH],
     first_node: u32,
 }
@@ -110,7 +110,7 @@ impl Node {
         }
     }
 
-    /// A node, or [`LEAF`](super::LEAF) and a light.
+    /// A node, or [`LEAF`] and a light.
     #[inline(always)]
     pub fn child(&self, slot: usize) -> u32 {
         self.child[slot]
