@@ -36,7 +36,7 @@ pub struct HybridOptions {
 }
 
 /// A hierarchy for packets over the spheres, cylinders, disks and quads of the world that have no holes, and Embree or
-/// the BVH. Beside the BVH, packets have up to 512 of them, 64 where there are floors or walls, or none.
+/// the BVH. Where there are more than 512 of them, or 64 beside floors or walls, all are in the BVH.
 pub struct HybridAccel<'g> {
     others: Box<dyn Accelerator + 'g>,
     /// In packets.

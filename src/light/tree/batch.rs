@@ -1,6 +1,6 @@
 //! Choices for a batch of points at once.
 
-use super::cuts::{Cuts, NodeOfCut, ShadingPoint};
+use super::cuts::{Cuts, PickedNode, ShadingPoint};
 use super::node::WIDTH;
 use super::pick::{pick, total};
 use super::{LEAF, LightTree, MAX_OPEN, TreeChoice};
@@ -94,7 +94,7 @@ impl BatchCuts {
             level.u[point] = cuts.u[point] - cuts.starts[i];
         }
         for (point, all) in cuts.totals.iter().enumerate().take(whole_vectors(cuts.count)) {
-            let node = NodeOfCut::new(0, level.u[point], total(&level.importances(point)), *all);
+            let node = PickedNode::new(level.u[point], total(&level.importances(point)), *all);
             (level.u[point], level.pmfs[point]) = (node.share, node.pmf);
         }
     }

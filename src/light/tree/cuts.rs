@@ -118,33 +118,35 @@ impl<const POINTS: usize, const NODES: usize> Cuts<POINTS, NODES> {
 }
 
 impl OneCut {
-    /// The node in which the point's number falls if all are laid end to end.
+    /// The node in which the point's number falls if all are laid end to end, and its index in the cut.
     #[inline(always)]
-    pub fn pick(&self) -> NodeOfCut {
+    pub fn pick(&self) -> (usize, PickedNode) {
         let x = self.u[0] * self.totals[0];
         let i = (1..self.node_count).rev().find(|&i| x >= self.starts[i]).unwrap_or(0);
-        NodeOfCut::new(i, x - self.starts[i], total(&self.importances[i]), self.totals[0])
+        (i, PickedNode::new(x - self.starts[i], total(&self.importances[i]), self.totals[0]))
     }
 }
 
 /// A node of a cut in which a number falls.
 #[derive(Clone, Copy)]
-pub(super) struct NodeOfCut {
-    /// Its place among the nodes.
-    pub i: usize,
+pub(super) struct PickedNode {
     /// How far into the node the number falls, in `[0, 1)`.
     pub share: f64,
     /// Probability of the node; 0 where nothing arrives.
     pub pmf: f32,
 }
 
-impl NodeOfCut {
+impl PickedNode {
     /// Of a distance into the node, and sums of the importances of the node and of all.
     #[inline(always)]
-    pub fn new(i: usize, distance: f64, total: f32, all: f64) -> Self {
-        let (total, last) = (f64::from(total), f64::from(ONE_MINUS_EPSILON));
-        let share = distance / total;
-        let pmf = if all > 0.0 { (total / all) as f32 } else { 0.0 };
-        Self { i, share: if share < last { share } else { last }, pmf }
+    pub fn new(distance: f64, total: f32, all: f64) -> Self {
+        let (share, last) = (distance / f64::from(total), f64::from(ONE_MINUS_EPSILON));
+        Self { share: if share < last { share } else { last }, pmf: node_pmf(total, all) }
     }
+}
+
+/// Probability of a node of a cut, by sums of the importances of the node and of all; 0 where nothing arrives.
+#[inline(always)]
+pub(super) fn node_pmf(total: f32, all: f64) -> f32 {
+    if all > 0.0 { (f64::from(total) / all) as f32 } else { 0.0 }
 }

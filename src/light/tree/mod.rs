@@ -21,7 +21,7 @@ pub use rows::LightTreeScratch;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::vectorize::vectorize;
 use crate::math::{DVec3, Vec3};
-use cuts::OneCut;
+use cuts::{OneCut, node_pmf};
 use node::{Node, WIDTH};
 use pick::{pick, total};
 
@@ -106,8 +106,8 @@ fn choose(tree: &LightTree, p: Vec3, n: Vec3, u: f64) -> Option<TreeChoice> {
         let mut cut = OneCut::default();
         cut.push(p, n, u);
         cut.expand(tree);
-        let picked = cut.pick();
-        (cut.nodes[picked.i], cut.importances[picked.i], picked.share, picked.pmf)
+        let (i, picked) = cut.pick();
+        (cut.nodes[i], cut.importances[i], picked.share, picked.pmf)
     };
     loop {
         let picked = pick(&importances, u);
@@ -139,9 +139,7 @@ fn pmf(tree: &LightTree, p: Vec3, n: Vec3, light: u32) -> f32 {
     // Up to the cut, which holds the root.
     loop {
         if let Some(importances) = cut.find(node) {
-            let all = cut.totals[0];
-            let of_node = if all > 0.0 { (f64::from(total(importances)) / all) as f32 } else { 0.0 };
-            return pmf * pmf_of_child(importances, slot) * of_node;
+            return pmf * pmf_of_child(importances, slot) * node_pmf(total(importances), cut.totals[0]);
         }
         pmf *= pmf_of_child(&tree.nodes[node as usize].importances(p, n).of, slot);
         Place { node, slot } = tree.node_places[node as usize];

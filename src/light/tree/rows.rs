@@ -45,8 +45,9 @@ impl LightTree {
         choices.pmf = [0.0; BATCH];
         for lane in (0..queries.count.min(BATCH)).filter(|&lane| is_wanted(lane)) {
             let [u, _, _, digits] = queries.u.of(lane);
-            let u = with_digits([u, digits]) / f64::from(share);
-            if u < 1.0 {
+            let u = with_digits([u, digits]);
+            if u < f64::from(share) {
+                let u = (u / f64::from(share)).min(f64::from(ONE_MINUS_EPSILON));
                 batch.cuts.push(queries.points.get(lane).as_vec3(), queries.normals.get(lane), u);
                 lanes.push(lane);
             }
