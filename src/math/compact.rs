@@ -1,8 +1,9 @@
-//! Compaction: the chosen lanes of rows, one after the other.
+//! Compaction: the chosen lanes of rows, one after the other; and expansion, which undoes it.
 
-use pulp::bytemuck::cast_mut;
+use pulp::bytemuck::{cast_mut, cast_ref};
 use pulp::cast;
 use pulp::x86::{V3, V4};
+use std::arch::x86_64::__m256i;
 
 use super::rows::{BATCH, Row, WIDTH, whole_vectors};
 
@@ -31,12 +32,16 @@ impl Instructions {
     }
 }
 
-/// Writes the numbers whose bits are set, then any others.
+/// Moves numbers between the lanes whose bits are set and the first ones.
 pub trait Compress: Copy {
-    /// Numbers of 32 bits.
+    /// Writes the numbers of 32 bits whose bits are set, then any others.
     fn of_32_bits(self, bits: u16, numbers: [u32; WIDTH], to: &mut [u32; WIDTH]);
-    /// Numbers of 64 bits.
+    /// Writes the numbers of 64 bits whose bits are set, then any others.
     fn of_64_bits(self, bits: u16, numbers: [u64; WIDTH], to: &mut [u64; WIDTH]);
+    /// Writes the first numbers of 32 bits to the lanes whose bits are set.
+    fn expand_32_bits(self, bits: u16, numbers: &[u32; WIDTH], to: &mut [u32; WIDTH]);
+    /// Writes the first numbers of 64 bits to the lanes whose bits are set.
+    fn expand_64_bits(self, bits: u16, numbers: &[u64; WIDTH], to: &mut [u64; WIDTH]);
 }
 
 impl Compress for V4 {
@@ -49,6 +54,18 @@ impl Compress for V4 {
     fn of_64_bits(self, bits: u16, numbers: [u64; WIDTH], to: &mut [u64; WIDTH]) {
         store_parts(bits, cast::<_, [[u64; 8]; 2]>(numbers), to, |bits, part| {
             cast(self.avx512f._mm512_maskz_compress_epi64(bits as u8, cast(part)))
+        });
+    }
+
+    #[inline(always)]
+    fn expand_32_bits(self, bits: u16, numbers: &[u32; WIDTH], to: &mut [u32; WIDTH]) {
+        *to = cast(self.avx512f._mm512_mask_expand_epi32(cast(*to), bits, cast(*numbers)));
+    }
+
+    #[inline(always)]
+    fn expand_64_bits(self, bits: u16, numbers: &[u64; WIDTH], to: &mut [u64; WIDTH]) {
+        load_parts(bits, numbers, cast_mut::<_, [[u64; 8]; 2]>(to), |bits, part, to| {
+            cast(self.avx512f._mm512_mask_expand_epi64(cast(to), bits as u8, cast(part)))
         });
     }
 }
@@ -68,6 +85,47 @@ impl Compress for V3 {
             let order = self.avx2._mm256_cvtepu8_epi32(cast([ORDER_OF_4[usize::from(bits % 16)], 0]));
             cast(self.avx2._mm256_permutevar8x32_epi32(cast(part), order))
         });
+    }
+
+    #[inline(always)]
+    fn expand_32_bits(self, bits: u16, numbers: &[u32; WIDTH], to: &mut [u32; WIDTH]) {
+        load_parts(bits, numbers, cast_mut::<_, [[u32; 8]; 2]>(to), |bits, part, to| {
+            cast(expand_by(self, RANKS_OF_8[usize::from(bits as u8)], cast(part), cast(to)))
+        });
+    }
+
+    #[inline(always)]
+    fn expand_64_bits(self, bits: u16, numbers: &[u64; WIDTH], to: &mut [u64; WIDTH]) {
+        load_parts(bits, numbers, cast_mut::<_, [[u64; 4]; 4]>(to), |bits, part, to| {
+            cast(expand_by(self, RANKS_OF_4[usize::from(bits % 16)], cast(part), cast(to)))
+        });
+    }
+}
+
+/// Takes each lane from the one with its rank, a byte each; negative ones keep what is there.
+#[inline(always)]
+fn expand_by(simd: V3, ranks: u64, part: __m256i, to: __m256i) -> __m256i {
+    let ranks = simd.avx2._mm256_cvtepi8_epi32(cast([ranks, 0]));
+    let chosen = simd.avx2._mm256_permutevar8x32_epi32(part, ranks);
+    // The sign of each lane, as a mask of all its bytes.
+    simd.avx2._mm256_blendv_epi8(chosen, to, simd.avx2._mm256_srai_epi32::<31>(ranks))
+}
+
+/// Replaces each part by what `expand` makes of it and of the numbers that follow those of the part before.
+#[inline(always)]
+fn load_parts<T: Copy, const N: usize, const PARTS: usize>(
+    bits: u16,
+    numbers: &[T; WIDTH],
+    to: &mut [[T; N]; PARTS],
+    expand: impl Fn(u16, [T; N], [T; N]) -> [T; N],
+) {
+    let mut at = 0;
+    for (i, to) in to.iter_mut().enumerate() {
+        let bits = bits >> (i * N) & (u16::MAX >> (16 - N));
+        if let Some(part) = numbers.get(at..).and_then(<[T]>::first_chunk::<N>) {
+            *to = expand(bits, *part, *to);
+        }
+        at += bits.count_ones() as usize;
     }
 }
 
@@ -111,24 +169,56 @@ const fn order<const N: usize>(halves: u32) -> [u64; N] {
     orders
 }
 
+/// The ranks of the lanes whose bits are set in the index, a byte each, which is negative for all others.
+const RANKS_OF_8: [u64; 256] = ranks(1);
+/// Of the halves of lanes of twice the width.
+const RANKS_OF_4: [u64; 16] = ranks(2);
+
+const fn ranks<const N: usize>(halves: u32) -> [u64; N] {
+    let mut ranks = [0; N];
+    let mut bits = 0;
+    while bits < N {
+        let (mut lane, mut rank) = (0, 0);
+        while lane < 8 {
+            let is_chosen = bits >> (lane / halves) & 1 != 0;
+            ranks[bits] |= (if is_chosen { rank } else { 0xff }) << (8 * lane);
+            rank += is_chosen as u64;
+            lane += 1;
+        }
+        bits += 1;
+    }
+    ranks
+}
+
 /// Numbers that can be compacted.
 pub trait Compact: Copy + Default {
     /// Writes the numbers whose bits are set, then any others.
     fn compress(by: impl Compress, bits: u16, numbers: &[Self; WIDTH], to: &mut [Self; WIDTH]);
+    /// Writes the first numbers to the lanes whose bits are set.
+    fn expand(by: impl Compress, bits: u16, numbers: &[Self; WIDTH], to: &mut [Self; WIDTH]);
 }
 
 macro_rules! compact {
-    ($($number:ty => $of_bits:ident,)*) => {$(
+    ($($number:ty => $of_bits:ident, $expand_bits:ident,)*) => {$(
         impl Compact for $number {
             #[inline(always)]
             fn compress(by: impl Compress, bits: u16, numbers: &[Self; WIDTH], to: &mut [Self; WIDTH]) {
                 by.$of_bits(bits, cast(*numbers), cast_mut(to));
             }
+
+            #[inline(always)]
+            fn expand(by: impl Compress, bits: u16, numbers: &[Self; WIDTH], to: &mut [Self; WIDTH]) {
+                by.$expand_bits(bits, cast_ref(numbers), cast_mut(to));
+            }
         }
     )*};
 }
 
-compact! { f32 => of_32_bits, u32 => of_32_bits, f64 => of_64_bits, }
+compact! {
+    f32 => of_32_bits, expand_32_bits,
+    u32 => of_32_bits, expand_32_bits,
+    f64 => of_64_bits, expand_64_bits,
+}
 
 impl Compaction {
     /// Those of the first `count` lanes whose `flags` are `chosen`.
@@ -158,6 +248,17 @@ impl Compaction {
             count: masks.iter().map(|mask| mask.count_ones() as usize).sum(),
             instructions: Instructions::detect(),
         }
+    }
+
+    /// These lanes, in ascending order.
+    #[inline]
+    pub fn of(lanes: &[u8]) -> Self {
+        let mut masks = [0; BATCH / WIDTH];
+        for lane in lanes.iter().map(|&lane| usize::from(lane) % BATCH) {
+            masks[lane / WIDTH] |= 1 << (lane % WIDTH);
+        }
+        let used = lanes.last().map_or(0, |&last| usize::from(last) % BATCH / WIDTH + 1);
+        Self { masks, used, count: lanes.len(), instructions: Instructions::detect() }
     }
 
     /// How many there are.
@@ -272,6 +373,46 @@ impl Compaction {
     }
 }
 
+impl Compaction {
+    /// Writes the first numbers of `from` to the chosen lanes of `to`, and nothing to the others.
+    #[inline]
+    pub fn expand<T: Compact>(&self, from: &Row<T>, to: &mut Row<T>) {
+        match self.instructions {
+            Instructions::Avx512(simd) => simd.vectorize(
+                #[inline(always)]
+                || self.expand_by(simd, from, to),
+            ),
+            Instructions::Avx2(simd) => simd.vectorize(
+                #[inline(always)]
+                || self.expand_by(simd, from, to),
+            ),
+            Instructions::Scalar => {
+                let lanes = (0..BATCH).filter(|&lane| self.contains(lane));
+                lanes.zip(from).for_each(|(lane, number)| to[lane] = *number);
+            }
+        }
+    }
+
+    /// [`expand`](Self::expand) by vectors.
+    #[inline(always)]
+    fn expand_by<T: Compact>(&self, by: impl Compress, from: &Row<T>, to: &mut Row<T>) {
+        let mut at = 0;
+        for (&bits, to) in self.masks.iter().zip(to.as_chunks_mut::<WIDTH>().0).take(self.used) {
+            // No more lanes than these are before.
+            if let Some(numbers) = from.get(at..).and_then(<[T]>::first_chunk::<WIDTH>) {
+                T::expand(by, bits, numbers, to);
+            }
+            at += bits.count_ones() as usize;
+        }
+    }
+
+    /// [`expand`](Self::expand) for three rows.
+    #[inline]
+    pub fn expand_3<T: Compact>(&self, from: &[Row<T>; 3], to: &mut [Row<T>; 3]) {
+        (0..3).for_each(|k| self.expand(&from[k], &mut to[k]));
+    }
+}
+
 /// The places of bits that are set, in order.
 #[inline(always)]
 pub fn set_bits(mut bits: u32) -> impl Iterator<Item = usize> {
@@ -376,6 +517,21 @@ mod tests {
                         assert_eq!(both_f64[..at + chosen.len()], both[..at + chosen.len()]);
                     }
                 }
+                for instructions in instructions.into_iter().flatten() {
+                    let lanes = Compaction { instructions, ..lanes };
+                    let (mut compacted, mut expanded) = ([0.0; BATCH], [-1.0; BATCH]);
+                    lanes.compact(&numbers, &mut compacted);
+                    lanes.expand(&compacted, &mut expanded);
+                    let mut expanded_f64 = [-1.0; BATCH];
+                    lanes.expand(&compacted.map(f64::from), &mut expanded_f64);
+                    let expected: Row =
+                        std::array::from_fn(|lane| if lanes.contains(lane) { lane as f32 } else { -1.0 });
+                    assert_eq!(expanded, expected);
+                    assert_eq!(expanded_f64, expected.map(f64::from));
+                }
+                let list: Vec<u8> = chosen.iter().map(|&lane| lane as u8).collect();
+                let listed = Compaction::of(&list);
+                assert_eq!((listed.masks, listed.count), (lanes.masks, lanes.count));
             }
         }
     }

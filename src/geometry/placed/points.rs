@@ -12,22 +12,22 @@ soa! {
     pub struct WorldPointRows {
         /// The point, in the space the shape is placed in.
         p: DVec3,
-        /// Distance in units of the ray's direction.
-        t: f64,
     }
 }
 
 soa! {
     /// What else is found of them.
     pub struct WorldNormalRows {
+        /// Distance in units of the ray's direction.
+        t: f32,
         /// Unit normal.
         n: Vec3,
         /// Change of the point with u; as the next one, zero for other shapes than quads.
         dp_du: Vec3,
         /// Surface parameters.
         uv: Vec2,
-        /// 0 where [`TransformedShape::interaction`] has to be called, else 1.
-        is_resolved: u32,
+        /// 1 where [`TransformedShape::interaction`] has to be called, else 0.
+        is_unresolved: u32,
     }
 }
 
@@ -89,7 +89,7 @@ pub(super) fn resolve(
         Analytic::Quad(quad) => resolve_on(placed, quad, rays, t, count, points, normals),
         Analytic::Disk(disk) => resolve_on(placed, disk, rays, t, count, points, normals),
         Analytic::Frustum(frustum) => resolve_on(placed, frustum, rays, t, count, points, normals),
-        Analytic::Revolution(_) => normals.is_resolved = [0; BATCH],
+        Analytic::Revolution(_) => normals.is_unresolved = [1; BATCH],
     });
 }
 
@@ -141,13 +141,13 @@ fn resolve_on<S: LaneShape>(
         let surface = shape.place(&local, &LocalHit { t: distance, profile: 0.0 });
         let found = placed.place(surface.p, surface.n, surface.pdf_area);
         points.p.set(i, found.p);
-        points.t[i] = distance + shift;
+        normals.t[i] = (distance + shift) as f32;
         normals.n.set(i, found.n);
         normals.dp_du.set(i, placed.transform.vector(surface.dp_du).as_vec3());
         normals.uv.set(i, Vec2::new(surface.uv[0] as f32, surface.uv[1] as f32));
         // The first hit is the one that was found, and ahead; false for a NaN.
         let expected = f64::from(<f32 as Element>::get(t, i));
         let is_resolved = ((expected - shift) - distance <= 8.0 * UNIT_ROUNDOFF * expected) & (distance + shift > 0.0);
-        normals.is_resolved[i] = u32::from(is_resolved);
+        normals.is_unresolved[i] = u32::from(!is_resolved);
     }
 }

@@ -193,8 +193,11 @@ soa! {
 /// Hits on one analytic shape.
 pub(super) struct AnalyticScratch {
     pub lanes: Vec<u8>,
-    pub rays: RayRows,
+    /// Of the rays of all vertices.
+    pub t_min: Row,
     pub t: Row,
+    pub rays: RayRows,
+    pub ray_t: Row,
     pub points: WorldPointRows,
     pub normals: WorldNormalRows,
 }
@@ -203,8 +206,10 @@ impl Default for AnalyticScratch {
     fn default() -> Self {
         Self {
             lanes: Vec::with_capacity(BATCH),
-            rays: RayRows::default(),
+            t_min: [0.0; BATCH],
             t: [0.0; BATCH],
+            rays: RayRows::default(),
+            ray_t: [0.0; BATCH],
             points: WorldPointRows::default(),
             normals: WorldNormalRows::default(),
         }

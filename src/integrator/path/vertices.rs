@@ -34,7 +34,9 @@ pub(super) fn find(context: &Context, wave: &mut Wave, block: usize) {
         }
     }
     if features.analytic_shapes {
-        resolve_analytic(context, vertices, rays, hits);
+        lanes.compact(&rays.t_min, &mut vertices.analytic.t_min);
+        lanes.compact(&hits.t, &mut vertices.analytic.t);
+        resolve_analytic(context, vertices);
     }
     for lane in 0..vertices.count.min(BATCH) {
         if vertices.rows.is_unresolved[lane] != 0 {
@@ -103,9 +105,9 @@ fn start_vertices(vertices: &mut Vertices, lanes: &Compaction, paths: &PathRows,
 }
 
 /// Resolves hits on analytic shapes in the world that need no more than rows have, many on one shape at a time.
-fn resolve_analytic(context: &Context, vertices: &mut Vertices, rays: &RayRows, hits: &HitRows) {
-    let Vertices { count, rows, points, analytic, .. } = vertices;
-    let AnalyticScratch { lanes, rays: gathered, t, points: found, normals } = analytic;
+fn resolve_analytic(context: &Context, vertices: &mut Vertices) {
+    let Vertices { count, rows, points, triangles, analytic, .. } = vertices;
+    let AnalyticScratch { lanes, t_min, t, rays, ray_t, points: found, normals } = analytic;
     collect_lanes(lanes, *count, |lane| {
         let is_in_world = rows.is_unresolved[lane] != 0 && rows.instance[lane] == Hit::NO_INSTANCE.0;
         is_in_world && context.world.resolves_in_rows(ShapeId(rows.shape[lane]))
@@ -118,25 +120,24 @@ fn resolve_analytic(context: &Context, vertices: &mut Vertices, rays: &RayRows, 
         if lanes.len() < MIN_ANALYTIC_LANES {
             continue;
         }
-        for (i, &lane) in lanes.iter().enumerate() {
-            let path = rows.path[usize::from(lane)] as usize;
-            gathered.origin.set(i, rays.origin.get(path));
-            gathered.direction.set(i, rays.direction.get(path));
-            gathered.t_min[i] = rays.t_min[path];
-            t[i] = hits.t[path];
-        }
-        placed.resolve_rows(gathered, t, lanes.len(), found, normals);
-        for (i, &lane) in lanes.iter().enumerate().filter(|&(i, _)| normals.is_resolved[i] != 0) {
+        for &lane in lanes {
             let lane = usize::from(lane);
-            points.p.set(lane, found.p.get(i));
-            (rows.t[lane], rows.error[lane]) = (found.t[i] as f32, placed.error());
-            rows.n_g.set(lane, normals.n.get(i));
-            rows.n_s.set(lane, normals.n.get(i));
-            rows.dp_du.set(lane, normals.dp_du.get(i));
-            rows.uv.set(lane, normals.uv.get(i));
-            rows.uv_density[lane] = 0.0;
-            rows.is_unresolved[lane] = 0;
+            (rows.error[lane], rows.uv_density[lane]) = (placed.error(), 0.0);
         }
+        let lanes = Compaction::of(lanes);
+        lanes.compact_3(&triangles.origin.0, &mut rays.origin.0);
+        lanes.compact_3(&rows.direction.0, &mut rays.direction.0);
+        lanes.compact(t_min, &mut rays.t_min);
+        lanes.compact(t, ray_t);
+        placed.resolve_rows(rays, ray_t, lanes.len(), found, normals);
+        // What is not resolved here is set by `World::resolve`.
+        lanes.expand_3(&found.p.0, &mut points.p.0);
+        lanes.expand(&normals.t, &mut rows.t);
+        lanes.expand_3(&normals.n.0, &mut rows.n_g.0);
+        lanes.expand_3(&normals.n.0, &mut rows.n_s.0);
+        lanes.expand_3(&normals.dp_du.0, &mut rows.dp_du.0);
+        (0..2).for_each(|k| lanes.expand(&normals.uv.0[k], &mut rows.uv.0[k]));
+        lanes.expand(&normals.is_unresolved, &mut rows.is_unresolved);
     }
 }
 

@@ -275,9 +275,9 @@ fn points_resolved_in_rows_are_those_of_single_hits() {
             }
             let (mut points, mut normals) = (WorldPointRows::default(), WorldNormalRows::default());
             placed.resolve_rows(&rays, &t, count, &mut points, &mut normals);
-            for (i, hit) in found.iter().enumerate().filter(|&(i, _)| normals.is_resolved[i] != 0) {
+            for (i, hit) in found.iter().enumerate().filter(|&(i, _)| normals.is_unresolved[i] == 0) {
                 let at = placed.interaction(&rays.get(i), hit).unwrap();
-                let found = (points.p.get(i), points.t[i] as f32, normals.n.get(i), placed.error());
+                let found = (points.p.get(i), normals.t[i], normals.n.get(i), placed.error());
                 assert_eq!(found, (at.p, at.t, at.n_g, at.error), "{placed:?} {i}");
                 if matches!(placed.shape, Analytic::Quad(_)) {
                     let found = (normals.dp_du.get(i), normals.uv.get(i));
