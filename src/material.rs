@@ -13,7 +13,7 @@ use crate::bsdf::{
 use crate::color::Rgb;
 use crate::id::{MaterialId, TextureId};
 use crate::math::Vec2;
-use crate::texture::{Footprint, Texture};
+use crate::texture::{Checker, Footprint, Texture};
 
 /// A material.
 #[derive(Clone, Debug, PartialEq)]
@@ -276,6 +276,15 @@ impl TexturedMaterial {
             Self::Diffuse { albedo, roughness } if roughness.at(textures, footprint) == 0.0 => {
                 Some(albedo.at(textures, footprint))
             }
+            _ => None,
+        }
+    }
+
+    /// The albedo where the scattering is Lambert's and the albedo a checkerboard, each channel within `[0, 1]`.
+    #[inline]
+    pub fn lambert_checker(&self, textures: &[Texture]) -> Option<Checker> {
+        match self {
+            Self::Diffuse { albedo, roughness } if roughness.is_zero() => albedo.checker(textures),
             _ => None,
         }
     }

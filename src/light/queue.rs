@@ -8,7 +8,8 @@ use super::{EnvironmentMap, Light, LightSample, LightSampleContext, LightSet, Mi
 use crate::color::Rgb;
 use crate::geometry::{Geometry, SpawnPoint};
 use crate::id::LightId;
-use crate::math::rows::{BATCH, DVec3Rows, Vec3Rows, soa};
+use crate::math::compact::Compaction;
+use crate::math::rows::{BATCH, DVec3Rows, Row, Vec3Rows, soa};
 use crate::math::{DVec3, Vec3};
 use crate::sampling::SampleRows;
 use crate::texture::Texture;
@@ -45,36 +46,109 @@ soa! {
     }
 }
 
-impl LightSampleRows {
-    /// Sets the sample of a vertex, whose light was chosen with probability `pmf`.
+/// Where light samples are written to.
+pub(super) struct LightSampleOutput<'a> {
+    /// Probabilities with which the lights were chosen.
+    pub pmfs: &'a Row,
+    /// Samples and
+    pub samples: &'a mut LightSampleRows,
+    /// the points they end at.
+    pub target_p: &'a mut DVec3Rows,
+}
+
+impl LightSampleOutput<'_> {
+    /// Sets the sample of a vertex.
     #[inline(always)]
-    fn set(&mut self, lane: usize, sample: &LightSample, pmf: f32, target_p: &mut DVec3Rows) {
-        self.is_delta[lane] = u32::from(sample.is_delta);
-        self.direction.set(lane, sample.wi);
-        self.radiance.set(lane, sample.radiance);
-        self.pdf[lane] = sample.pdf * pmf;
+    pub fn set(&mut self, lane: usize, sample: &LightSample) {
+        let Self { pmfs, samples, target_p } = self;
+        samples.is_delta[lane] = u32::from(sample.is_delta);
+        samples.direction.set(lane, sample.wi);
+        samples.radiance.set(lane, sample.radiance);
+        samples.pdf[lane] = sample.pdf * pmfs[lane];
         match &sample.target {
             ShadowTarget::Point(SpawnPoint { p, n, error }) => {
-                self.target[lane] = light_target::POINT;
+                samples.target[lane] = light_target::POINT;
                 target_p.set(lane, *p);
-                self.target_n.set(lane, *n);
-                self.target_error[lane] = *error;
+                samples.target_n.set(lane, *n);
+                samples.target_error[lane] = *error;
             }
-            ShadowTarget::Infinity => self.target[lane] = light_target::INFINITY,
+            ShadowTarget::Infinity => samples.target[lane] = light_target::INFINITY,
+        }
+    }
+
+    /// Sets the samples of vertices with the first ones of `from`, which end at the points `target_p`.
+    pub fn expand(&mut self, lanes: &Compaction, from: &LightSampleRows, target_p: &DVec3Rows) {
+        let to = &mut *self.samples;
+        lanes.expand(&from.target, &mut to.target);
+        lanes.expand(&from.is_delta, &mut to.is_delta);
+        lanes.expand_3(&from.direction.0, &mut to.direction.0);
+        lanes.expand_3(&from.radiance.0, &mut to.radiance.0);
+        lanes.expand(&from.pdf, &mut to.pdf);
+        lanes.expand_3(&from.target_n.0, &mut to.target_n.0);
+        lanes.expand(&from.target_error, &mut to.target_error);
+        lanes.expand_3(&target_p.0, &mut self.target_p.0);
+    }
+}
+
+/// Which lights are sampled together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum SampleGroup {
+    /// Parallelograms that emit evenly.
+    Parallelograms,
+    /// Spheres that emit evenly, and outwards.
+    Spheres,
+    /// Other analytic shapes that emit evenly.
+    Shapes,
+    /// The image around the scene.
+    EnvironmentMap,
+    /// Lights that are sampled for one vertex after another.
+    Alone,
+    /// No light.
+    None,
+}
+
+impl SampleGroup {
+    /// The group of a light; `is_map`: it is the first image around the scene.
+    pub fn of(light: &Light, is_map: bool) -> Self {
+        match light {
+            Light::Area(light) => light.sample_group(),
+            _ if is_map => Self::EnvironmentMap,
+            _ => Self::Alone,
         }
     }
 }
 
-/// Vertices that sample lights, at most [`BATCH`]: area lights and the image around the scene are sampled for many of
-/// them at once.
+/// Vertices by the groups of their lights, in ascending order.
+struct GroupedLanes {
+    lanes: [[u8; BATCH]; GROUPS],
+    counts: [usize; GROUPS],
+}
+
+const GROUPS: usize = SampleGroup::None as usize + 1;
+
+impl GroupedLanes {
+    /// Without branches: which light a vertex chooses is not to be predicted.
+    #[inline(always)]
+    fn push(&mut self, group: SampleGroup, lane: usize) {
+        let group = group as usize;
+        let count = &mut self.counts[group];
+        self.lanes[group][*count % BATCH] = lane as u8;
+        *count += 1;
+    }
+
+    fn of(&self, group: SampleGroup) -> &[u8] {
+        &self.lanes[group as usize][..self.counts[group as usize]]
+    }
+}
+
+/// Samples lights for vertices, at most [`BATCH`]: area lights and the image around the scene for many of them at once.
 pub struct LightQueue {
     choices: LightChoiceRows,
     tree_scratch: LightTreeScratch,
+    lanes: GroupedLanes,
     area: AreaQueue,
     emitters: EmitterQueue,
     sky: SkyQueue,
-    /// Vertices whose lights are sampled one by one.
-    alone: Vec<(usize, LightId)>,
 }
 
 impl Default for LightQueue {
@@ -82,10 +156,10 @@ impl Default for LightQueue {
         Self {
             choices: LightChoiceRows::default(),
             tree_scratch: LightTreeScratch::default(),
+            lanes: GroupedLanes { lanes: [[0; BATCH]; GROUPS], counts: [0; GROUPS] },
             area: AreaQueue::default(),
             emitters: EmitterQueue::default(),
             sky: SkyQueue::default(),
-            alone: Vec::with_capacity(BATCH),
         }
     }
 }
@@ -137,15 +211,7 @@ impl LightQueue {
         self.area.reset();
     }
 
-    /// Empties the queue.
-    pub fn clear(&mut self) {
-        self.area.clear();
-        self.emitters.clear();
-        self.sky.lanes.clear();
-        self.alone.clear();
-    }
-
-    /// Chooses a light for each vertex that is wanted, and queues its sample.
+    /// Chooses a light for each vertex that is wanted.
     #[inline(always)]
     pub fn choose(
         &mut self,
@@ -154,27 +220,18 @@ impl LightQueue {
         is_wanted: impl Fn(usize) -> bool,
         samples: &mut LightSampleRows,
     ) {
-        let Self { choices, tree_scratch, .. } = self;
+        let Self { choices, tree_scratch, lanes, .. } = self;
         context.lights.choose_rows(queries, &is_wanted, context.compensation, tree_scratch, choices);
-        samples.light = self.choices.light;
-        for lane in (0..queries.count.min(BATCH)).filter(|&lane| is_wanted(lane)) {
-            if self.choices.pmf[lane] > 0.0 {
-                self.push(context, lane, LightId(self.choices.light[lane]));
-            }
+        samples.light = choices.light;
+        lanes.counts = [0; GROUPS];
+        for lane in 0..queries.count.min(BATCH) {
+            let is_chosen = is_wanted(lane) & (choices.pmf[lane] > 0.0);
+            let group = context.lights.sample_group(LightId(choices.light[lane]));
+            lanes.push(if is_chosen { group } else { SampleGroup::None }, lane);
         }
     }
 
-    /// Queues a sample of a light for the vertex `lane`.
-    #[inline(always)]
-    fn push(&mut self, context: &LightContext, lane: usize, id: LightId) {
-        match context.lights.get(id) {
-            Light::Area(light) if self.area.push(light, id, lane) || self.emitters.push(light, id, lane) => {}
-            _ if context.lights.environment_map().is_some_and(|(map, _)| map == id) => self.sky.lanes.push(lane),
-            _ => self.alone.push((lane, id)),
-        }
-    }
-
-    /// Samples what was queued, and sets the targets of all vertices.
+    /// Samples the chosen lights, and sets the targets of all vertices.
     pub fn sample(
         &mut self,
         context: &LightContext,
@@ -182,32 +239,32 @@ impl LightQueue {
         samples: &mut LightSampleRows,
         target_p: &mut DVec3Rows,
     ) {
-        let Self { choices, area, emitters, sky, alone, .. } = self;
-        let pmfs = &choices.pmf;
+        let Self { choices: LightChoiceRows { light: ids, pmf: pmfs }, lanes, area, emitters, sky, .. } = self;
+        area.queue(context.lights, lanes.of(SampleGroup::Parallelograms), ids);
         area.sample(queries, pmfs, samples, target_p);
-        let mut set = |lane: usize, sample: &LightSample| samples.set(lane, sample, pmfs[lane], target_p);
-        emitters.sample(context, queries, &mut set);
+        let out = &mut LightSampleOutput { pmfs, samples, target_p };
+        emitters.sample_spheres(lanes.of(SampleGroup::Spheres), ids, context, queries, out);
+        emitters.sample_shapes(lanes.of(SampleGroup::Shapes), ids, context, queries, out);
         if let Some((_, image)) = context.lights.environment_map() {
-            sky.sample(image, context.compensation, queries, &mut set);
+            sky.sample(lanes.of(SampleGroup::EnvironmentMap), image, context.compensation, queries, out);
         }
-        for &(lane, id) in &*alone {
+        for lane in lanes.of(SampleGroup::Alone).iter().map(|&lane| usize::from(lane)) {
             let (_, u) = queries.get(lane);
-            if let Some(sample) = context.lights.get(id).sample(
+            if let Some(sample) = context.lights.get(LightId(ids[lane])).sample(
                 context.geometry,
                 context.textures,
                 &queries.light_context(lane),
                 u,
                 context.compensation,
             ) {
-                set(lane, &sample);
+                out.set(lane, &sample);
             }
         }
     }
 }
 
-/// Vertices that sample an image around the scene.
+/// Samples an image around the scene.
 struct SkyQueue {
-    lanes: Vec<usize>,
     u: [[f32; 2]; BATCH],
     scratch: EnvironmentScratch,
     samples: InfiniteLightSampleRows,
@@ -216,7 +273,6 @@ struct SkyQueue {
 impl Default for SkyQueue {
     fn default() -> Self {
         Self {
-            lanes: Vec::with_capacity(BATCH),
             u: [[0.0; 2]; BATCH],
             scratch: EnvironmentScratch::default(),
             samples: InfiniteLightSampleRows::default(),
@@ -227,19 +283,26 @@ impl Default for SkyQueue {
 impl SkyQueue {
     fn sample(
         &mut self,
+        lanes: &[u8],
         image: &EnvironmentMap,
         compensation: MisCompensation,
         queries: &LightQueries,
-        mut set: impl FnMut(usize, &LightSample),
+        out: &mut LightSampleOutput,
     ) {
-        let Self { lanes, u, scratch, samples } = self;
-        for (u, &lane) in u.iter_mut().zip(&*lanes) {
-            *u = queries.get(lane).1;
+        let Self { u, scratch, samples } = self;
+        for (u, &lane) in u.iter_mut().zip(lanes) {
+            *u = queries.get(usize::from(lane)).1;
         }
-        if !lanes.is_empty() && scratch.sample(image, u, lanes.len(), compensation, samples) {
-            for (i, &lane) in lanes.iter().enumerate() {
-                set(lane, &LightSample::infinite_sample(samples.wi.get(i), samples.radiance.get(i), samples.pdf[i]));
-            }
+        if lanes.is_empty() || !scratch.sample(image, u, lanes.len(), compensation, samples) {
+            return;
         }
+        for (&lane, pdf) in lanes.iter().zip(&samples.pdf) {
+            let lane = usize::from(lane);
+            (out.samples.target[lane], out.samples.is_delta[lane]) = (light_target::INFINITY, 0);
+            out.samples.pdf[lane] = pdf * out.pmfs[lane];
+        }
+        let lanes = Compaction::of(lanes);
+        lanes.expand_3(&samples.wi.0, &mut out.samples.direction.0);
+        lanes.expand_3(&samples.radiance.0, &mut out.samples.radiance.0);
     }
 }

@@ -1,5 +1,6 @@
 //! All lights of a scene, and the sampling of one of them.
 
+use super::queue::SampleGroup;
 use super::tree::{LightSampleContext, LightTree, LightTreeScratch};
 use super::{Environment, EnvironmentMap, Light, LightQueries, MisCompensation};
 use crate::geometry::Geometry;
@@ -58,6 +59,7 @@ pub enum LightSelection {
 #[derive(Clone, Debug, Default)]
 pub struct LightSet {
     lights: Vec<Light>,
+    sample_groups: Vec<SampleGroup>,
     /// Lights that are not at infinity, if a tree chooses among them.
     tree: Option<Box<LightTree>>,
     /// Without MIS compensation.
@@ -129,7 +131,9 @@ impl LightSet {
             LightDistribution { table: AliasTable::new(&probabilities), tree_share }
         };
         let (plain, mis_compensated) = (distribution(plain), mis_compensated.map(distribution));
-        Self { lights, tree: tree.map(Box::new), plain, mis_compensated, at_infinity, environment_map }
+        let is_map = |i: usize| environment_map.is_some_and(|map| map.index() == i);
+        let sample_groups = (0..lights.len()).map(|i| SampleGroup::of(&lights[i], is_map(i))).collect();
+        Self { lights, sample_groups, tree: tree.map(Box::new), plain, mis_compensated, at_infinity, environment_map }
     }
 
     /// All lights, by [`LightId`].
@@ -141,6 +145,12 @@ impl LightSet {
     #[inline]
     pub fn get(&self, id: LightId) -> &Light {
         &self.lights[id.index()]
+    }
+
+    /// With which lights this one is sampled for many vertices at once; none if there is no such light.
+    #[inline(always)]
+    pub(super) fn sample_group(&self, id: LightId) -> SampleGroup {
+        self.sample_groups.get(id.index()).copied().unwrap_or(SampleGroup::None)
     }
 
     /// Whether a light that shines from a place may be within these bounds.
@@ -210,13 +220,21 @@ impl LightSet {
     /// Probability with which [`choose`](Self::choose) takes this light for `from`.
     #[inline]
     pub fn pmf(&self, id: LightId, from: &LightSampleContext, compensation: MisCompensation) -> f32 {
+        match &self.tree {
+            Some(tree) if !self.get(id).is_at_infinity() => {
+                tree.pmf(from, id.0) * self.distribution(compensation).tree_share
+            }
+            _ => self.pmf_by_power(id, compensation),
+        }
+    }
+
+    /// Probability with which [`choose`](Self::choose) takes this light, whatever it is for, where power decides: of
+    /// any light without a tree, and of lights at infinity.
+    #[inline]
+    pub fn pmf_by_power(&self, id: LightId, compensation: MisCompensation) -> f32 {
         let distribution = self.distribution(compensation);
         let by_power = distribution.table.as_ref().map_or(0.0, |table| table.pmf(id.index()));
-        match &self.tree {
-            None => by_power,
-            Some(_) if self.get(id).is_at_infinity() => by_power * (1.0 - distribution.tree_share),
-            Some(tree) => tree.pmf(from, id.0) * distribution.tree_share,
-        }
+        if self.tree.is_some() { by_power * (1.0 - distribution.tree_share) } else { by_power }
     }
 
     /// The first image around the scene.

@@ -4,7 +4,7 @@ use crate::bsdf::{Beckmann, Bsdf, BsdfFlags, Coat, Plastic, SeparableGgx, Single
 use crate::color::Rgb;
 use crate::id::TextureId;
 use crate::math::Vec2;
-use crate::texture::{Footprint, Texture};
+use crate::texture::{Checker, Footprint, Texture};
 
 /// A colour that is constant or comes from a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +22,17 @@ impl ColorInput {
         match self {
             Self::Constant(color) => *color,
             Self::Texture(id) => textures[id.index()].color_over(footprint).map(|v| v.clamp(0.0, 1.0)),
+        }
+    }
+
+    /// The checkerboard that it comes from, if it does.
+    #[inline]
+    pub(super) fn checker(&self, textures: &[Texture]) -> Option<Checker> {
+        match self.texture().map(|id| &textures[id.index()]) {
+            Some(Texture::Checker(checker)) => {
+                Some(Checker { colors: checker.colors.map(|color| color.map(|v| v.clamp(0.0, 1.0))), ..*checker })
+            }
+            _ => None,
         }
     }
 

@@ -14,8 +14,16 @@ pub struct Compaction {
     /// How many of the masks may have bits: blocks are often nearly empty after many bounces.
     used: usize,
     count: usize,
+    /// The chosen lanes, if there are no more.
+    first: [u8; LISTED],
     instructions: Instructions,
 }
+
+/// Few lanes are moved one by one if they are fewer than this in each vector.
+const LISTED_IN_VECTOR: usize = 3;
+
+/// The most lanes that are moved one by one.
+const LISTED: usize = 16;
 
 /// The instructions that the machine has.
 #[derive(Clone, Copy, Debug)]
@@ -235,30 +243,73 @@ impl Compaction {
 
     #[inline(always)]
     fn new(flags: &Row<u32>, count: usize, is_chosen: impl Fn(u32) -> bool) -> Self {
-        let mut masks = [0u16; BATCH / WIDTH];
         let used = whole_vectors(count) / WIDTH;
-        for (i, (mask, flags)) in masks.iter_mut().zip(flags.as_chunks::<WIDTH>().0).enumerate().take(used) {
-            let chosen = (0..).zip(flags).fold(0, |bits, (lane, &flag)| bits | u32::from(is_chosen(flag)) << lane);
-            let within = count.saturating_sub(i * WIDTH).min(WIDTH);
-            *mask = (chosen & ((1 << within) - 1)) as u16;
+        let mut masks = masks_of(flags, used, is_chosen);
+        if let Some(last) = used.checked_sub(1).and_then(|last| masks.get_mut(last)) {
+            *last &= u16::MAX >> (used * WIDTH - count.min(BATCH));
         }
-        Self {
-            masks,
-            used,
-            count: masks.iter().map(|mask| mask.count_ones() as usize).sum(),
-            instructions: Instructions::detect(),
-        }
+        Self::from_masks(masks, used)
     }
 
-    /// These lanes, in ascending order.
+    /// These lanes, in any order.
     #[inline]
     pub fn of(lanes: &[u8]) -> Self {
         let mut masks = [0; BATCH / WIDTH];
         for lane in lanes.iter().map(|&lane| usize::from(lane) % BATCH) {
             masks[lane / WIDTH] |= 1 << (lane % WIDTH);
         }
-        let used = lanes.last().map_or(0, |&last| usize::from(last) % BATCH / WIDTH + 1);
-        Self { masks, used, count: lanes.len(), instructions: Instructions::detect() }
+        let used = masks.iter().rposition(|&mask| mask != 0).map_or(0, |last| last + 1);
+        Self::from_masks(masks, used)
+    }
+
+    /// Those of these lanes that are among `others`.
+    #[inline]
+    pub fn and(&self, others: &Self) -> Self {
+        let masks = std::array::from_fn(|i| self.masks[i] & others.masks[i]);
+        Self::from_masks(masks, self.used.min(others.used))
+    }
+
+    /// These lanes by their keys: each key with its lanes.
+    #[inline]
+    pub fn groups<'k>(&self, keys: &'k Row<u32>) -> impl Iterator<Item = (u32, Self)> + use<'k> {
+        let (mut rest, used) = (self.masks, self.used);
+        std::iter::from_fn(move || {
+            let key = keys[lanes_of(&rest).next()?];
+            let mut masks = masks_of(keys, used, |other| other == key);
+            for (mask, rest) in masks.iter_mut().zip(&mut rest) {
+                *mask &= *rest;
+                *rest ^= *mask;
+            }
+            Some((key, Self::from_masks(masks, used)))
+        })
+    }
+
+    #[inline(always)]
+    fn from_masks(masks: [u16; BATCH / WIDTH], used: usize) -> Self {
+        let count = masks.iter().map(|mask| mask.count_ones() as usize).sum();
+        let mut lanes = Self { masks, used, count, first: [0; LISTED], instructions: Instructions::detect() };
+        if lanes.is_listed() {
+            lanes.first.iter_mut().zip(lanes_of(&masks)).for_each(|(first, lane)| *first = lane as u8);
+        }
+        lanes
+    }
+
+    /// Whether the lanes are moved one by one.
+    #[inline(always)]
+    fn is_listed(&self) -> bool {
+        self.count <= LISTED && self.count < LISTED_IN_VECTOR * self.used
+    }
+
+    /// The lanes, if they are moved one by one.
+    #[inline(always)]
+    fn listed(&self) -> Option<&[u8]> {
+        if self.is_listed() { self.first.get(..self.count) } else { None }
+    }
+
+    /// The lanes, in ascending order.
+    #[inline]
+    pub fn lanes(&self) -> impl Iterator<Item = usize> {
+        lanes_of(&self.masks)
     }
 
     /// How many there are.
@@ -297,6 +348,15 @@ impl Compaction {
     pub fn append<T: Compact>(&self, from: &Row<T>, to: &mut Row<T>, next: Option<&mut Row<T>>, at: usize) {
         if self.count == BATCH && at == 0 {
             *to = *from;
+            return;
+        }
+        if let Some(lanes) = self.listed() {
+            let mut next = next;
+            for (at, &lane) in (at..).zip(lanes) {
+                if let Some(to) = place(to, next.as_deref_mut(), at) {
+                    *to = from[usize::from(lane) % BATCH];
+                }
+            }
             return;
         }
         match self.instructions {
@@ -377,6 +437,10 @@ impl Compaction {
     /// Writes the first numbers of `from` to the chosen lanes of `to`, and nothing to the others.
     #[inline]
     pub fn expand<T: Compact>(&self, from: &Row<T>, to: &mut Row<T>) {
+        if let Some(lanes) = self.listed() {
+            lanes.iter().zip(from).for_each(|(&lane, number)| to[usize::from(lane) % BATCH] = *number);
+            return;
+        }
         match self.instructions {
             Instructions::Avx512(simd) => simd.vectorize(
                 #[inline(always)]
@@ -386,10 +450,7 @@ impl Compaction {
                 #[inline(always)]
                 || self.expand_by(simd, from, to),
             ),
-            Instructions::Scalar => {
-                let lanes = (0..BATCH).filter(|&lane| self.contains(lane));
-                lanes.zip(from).for_each(|(lane, number)| to[lane] = *number);
-            }
+            Instructions::Scalar => self.lanes().zip(from).for_each(|(lane, number)| to[lane] = *number),
         }
     }
 
@@ -413,6 +474,23 @@ impl Compaction {
     }
 }
 
+/// The masks of the first lanes with such numbers, in `used` vectors.
+#[inline(always)]
+fn masks_of(numbers: &Row<u32>, used: usize, is_chosen: impl Fn(u32) -> bool) -> [u16; BATCH / WIDTH] {
+    let mut masks = [0; BATCH / WIDTH];
+    for (mask, numbers) in masks.iter_mut().zip(numbers.as_chunks::<WIDTH>().0).take(used) {
+        *mask = (0..).zip(numbers).fold(0, |bits, (lane, &number)| bits | u32::from(is_chosen(number)) << lane) as u16;
+    }
+    masks
+}
+
+/// The lanes whose bits are set, in order.
+#[inline(always)]
+fn lanes_of(masks: &[u16; BATCH / WIDTH]) -> impl Iterator<Item = usize> + use<> {
+    let masks = *masks;
+    (0..BATCH / WIDTH).flat_map(move |i| set_bits(masks[i].into()).map(move |bit| i * WIDTH + bit))
+}
+
 /// The places of bits that are set, in order.
 #[inline(always)]
 pub fn set_bits(mut bits: u32) -> impl Iterator<Item = usize> {
@@ -425,12 +503,18 @@ pub fn set_bits(mut bits: u32) -> impl Iterator<Item = usize> {
 
 /// Replaces `lanes` by the chosen ones of the first `count`, without branches.
 #[inline(always)]
-pub fn collect_lanes(lanes: &mut Vec<u8>, count: usize, mut is_chosen: impl FnMut(usize) -> bool) {
+pub fn collect_lanes(lanes: &mut Vec<u8>, count: usize, is_chosen: impl FnMut(usize) -> bool) {
+    filter_lanes(lanes, 0..count.min(BATCH) as u8, is_chosen);
+}
+
+/// Replaces `lanes` by the chosen ones of at most [`BATCH`] others, without branches.
+#[inline(always)]
+pub fn filter_lanes(lanes: &mut Vec<u8>, from: impl Iterator<Item = u8>, mut is_chosen: impl FnMut(usize) -> bool) {
     lanes.resize(BATCH, 0);
     let mut chosen = 0;
-    for lane in 0..count.min(BATCH) {
-        lanes[chosen % BATCH] = lane as u8;
-        chosen += usize::from(is_chosen(lane));
+    for lane in from {
+        lanes[chosen % BATCH] = lane;
+        chosen += usize::from(is_chosen(usize::from(lane) % BATCH));
     }
     lanes.truncate(chosen);
 }
@@ -529,6 +613,15 @@ mod tests {
                     assert_eq!(expanded, expected);
                     assert_eq!(expanded_f64, expected.map(f64::from));
                 }
+                let keys: Row<u32> = std::array::from_fn(|_| random.below(5) as u32);
+                let mut groups = Vec::new();
+                for (key, group) in lanes.groups(&keys) {
+                    let expected: Vec<_> = chosen.iter().copied().filter(|&lane| keys[lane] == key).collect();
+                    assert_eq!((group.lanes().collect::<Vec<_>>(), group.len()), (expected.clone(), expected.len()));
+                    groups.extend(expected);
+                }
+                groups.sort_unstable();
+                assert_eq!(groups, chosen);
                 let list: Vec<u8> = chosen.iter().map(|&lane| lane as u8).collect();
                 let listed = Compaction::of(&list);
                 assert_eq!((listed.masks, listed.count), (lanes.masks, lanes.count));

@@ -15,11 +15,14 @@ pub struct Checker {
 
 impl Checker {
     /// The colour at `uv`.
-    #[inline]
+    #[inline(always)]
     pub fn color(&self, uv: Vec2) -> Rgb {
         let cell = uv * self.scale;
         let second_half = |x: f32| x - floor(x) >= 0.5;
-        self.colors[usize::from(second_half(cell.x) != second_half(cell.y))]
+        let is_second = second_half(cell.x) != second_half(cell.y);
+        let [first, second] = self.colors.map(Rgb::to_array);
+        let channel = |k: usize| if is_second { second[k] } else { first[k] };
+        Rgb::new(channel(0), channel(1), channel(2))
     }
 }
 

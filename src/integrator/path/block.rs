@@ -190,12 +190,12 @@ soa! {
     }
 }
 
-/// Hits on one analytic shape.
+/// Hits on analytic shapes.
 pub(super) struct AnalyticScratch {
-    pub lanes: Vec<u8>,
     /// Of the rays of all vertices.
     pub t_min: Row,
     pub t: Row,
+    /// Hits on one shape.
     pub rays: RayRows,
     pub ray_t: Row,
     pub points: WorldPointRows,
@@ -205,7 +205,6 @@ pub(super) struct AnalyticScratch {
 impl Default for AnalyticScratch {
     fn default() -> Self {
         Self {
-            lanes: Vec::with_capacity(BATCH),
             t_min: [0.0; BATCH],
             t: [0.0; BATCH],
             rays: RayRows::default(),

@@ -113,7 +113,6 @@ fn choose_lights(context: &Context, vertices: &mut Vertices, queue: &mut LightQu
         lights,
         compensation: context.compensation,
     };
-    queue.clear();
     let Vertices { count, rows, points, u_light, light_samples, .. } = vertices;
     let queries = LightQueries { count: *count, points: &points.p, normals: &rows.light_context_n, u: u_light };
     let is_wanted = |lane: usize| rows.flags[lane] & vertex_flags::UNSAMPLED == 0;

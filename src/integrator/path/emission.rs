@@ -28,16 +28,30 @@ pub(super) fn bsdf_mis_weight(
     light_pdf: impl Fn(&LightSampleContext) -> f32,
 ) -> f32 {
     let from = paths.from(i);
-    let weight = match context.config.strategy {
-        _ if paths.is_specular(i) => 1.0,
-        Strategy::Mis => power_heuristic(paths.pdf[i], context.last_light_samples() as f32 * light_pdf(&from)),
-        Strategy::Light => 0.0,
-        Strategy::Bsdf => 1.0,
-    };
+    let weight = scattering_weight(context.config.strategy, paths.is_specular(i), paths.pdf[i], || {
+        context.last_light_samples() as f32 * light_pdf(&from)
+    });
     let Some(caustic) = caustic else { return weight };
     // Photons come from both sides.
     let from = LightSampleContext { n: Vec3::ZERO, ..from };
     against(weight, caustic.of_emission(|| light_pdf(&from)))
+}
+
+/// Weight of light that scattering has found with density `pdf`, against sampling the light with density `light_pdf`,
+/// which counts all light samples.
+#[inline(always)]
+pub(super) fn scattering_weight(
+    strategy: Strategy,
+    is_specular: bool,
+    pdf: f32,
+    light_pdf: impl FnOnce() -> f32,
+) -> f32 {
+    match strategy {
+        _ if is_specular => 1.0,
+        Strategy::Mis => power_heuristic(pdf, light_pdf()),
+        Strategy::Light => 0.0,
+        Strategy::Bsdf => 1.0,
+    }
 }
 
 /// A weight of the power heuristic against a further strategy too, whose squared density over the weighted one's is

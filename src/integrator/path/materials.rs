@@ -9,9 +9,10 @@ use crate::id::{MediumId, ShapeId};
 use crate::integrator::World;
 use crate::material::Material;
 use crate::math::compact::sort_lanes;
-use crate::math::rows::{BATCH, Row, Vec3Rows};
+use crate::math::rows::{BATCH, Row, Vec3Rows, whole_vectors};
+use crate::math::vectorize::vectorize;
 use crate::scene::Scene;
-use crate::texture::Footprint;
+use crate::texture::{Checker, Footprint};
 
 /// A BSDF by vertex: one of the scene's constant materials, or one made for the vertex.
 pub(super) struct BsdfTable {
@@ -176,7 +177,14 @@ fn evaluate_textured(context: &Context, vertices: &mut Vertices) {
     let scene = context.scene;
     for i in 0..vertices.textured.len() {
         let lane = usize::from(vertices.textured[i]);
-        let Material::Textured(textured, _) = &scene.materials[vertices.bsdfs.ids[lane] as usize] else { continue };
+        let id = vertices.bsdfs.ids[lane];
+        // All vertices on a checkerboard are set with its first.
+        let Some(Material::Textured(textured, _)) = scene.materials.get(id as usize) else { continue };
+        if let Some(checker) = textured.lambert_checker(&scene.textures) {
+            let Vertices { rows, bsdfs, count, .. } = &mut *vertices;
+            vectorize!(set_checkerboard(&checker, id, &mut bsdfs.ids, rows, *count));
+            continue;
+        }
         let (uv, area) = (vertices.rows.uv.get(lane), vertices.rows.texture_area[lane]);
         let footprint = scene.with_attributes(&vertices.interaction(lane), Footprint { uv, area, attributes: None });
         // Without a BSDF, which would be copied.
@@ -192,6 +200,18 @@ fn evaluate_textured(context: &Context, vertices: &mut Vertices) {
         if let Some(group) = group {
             vertices.bsdfs.groups[lane] = group;
         }
+    }
+}
+
+/// Sets the albedos of the vertices whose material has this id.
+#[inline(always)]
+fn set_checkerboard(checker: &Checker, id: u32, ids: &mut Row<u32>, rows: &mut VertexRows, count: usize) {
+    for i in 0..whole_vectors(count) {
+        let is_on_it = ids[i] == id;
+        let (color, albedo) = (checker.color(rows.uv.get(i)).to_array(), rows.albedo.get(i).to_array());
+        let channel = |k: usize| if is_on_it { color[k] } else { albedo[k] };
+        rows.albedo.set(i, Rgb::new(channel(0), channel(1), channel(2)));
+        ids[i] = if is_on_it { DIFFUSE } else { ids[i] };
     }
 }
 

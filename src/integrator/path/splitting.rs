@@ -12,6 +12,7 @@ use crate::color::Rgb;
 use crate::geometry::SpawnPoint;
 use crate::integrator::light_events::LobeWeights;
 use crate::integrator::vertex::HemisphereTest;
+use crate::math::compact::filter_lanes;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::rows::{BATCH, soa};
 use crate::math::{Ray, RayCone, Vec3, vec3};
@@ -93,8 +94,7 @@ pub(super) fn split(context: &Context, wave: &mut Wave, block: usize) {
 /// Finds the reflections of the vertices where paths may be split.
 fn sample_reflections(context: &Context, vertices: &mut Vertices, scratch: &mut BsdfScratch) {
     let Vertices { rows, non_diffuse, bsdfs, splits, split_lanes, .. } = vertices;
-    split_lanes.clear();
-    split_lanes.extend(non_diffuse.iter().filter(|&&lane| can_be_split(rows, usize::from(lane))));
+    filter_lanes(split_lanes, non_diffuse.iter().copied(), |lane| can_be_split(rows, lane));
     for lanes in bsdfs.groups(split_lanes) {
         // Reflection is the first lobe, what crosses the last.
         bsdfs.sample_group(context.scene, &rows.wo, lanes, |_| [0.0, 0.5, 0.5], scratch);
@@ -122,7 +122,7 @@ fn sample_reflections(context: &Context, vertices: &mut Vertices, scratch: &mut 
 /// Whether a vertex is on smooth glass and its path has met nothing but mirrors and such glass.
 fn can_be_split(rows: &VertexRows, lane: usize) -> bool {
     const GLASS: u32 = vertex_flags::DELTA | vertex_flags::TRANSMITS;
-    rows.flags[lane] & GLASS == GLASS && rows.path_flags[lane] & path_flags::ANY_NON_SPECULAR == 0
+    (rows.flags[lane] & GLASS == GLASS) & (rows.path_flags[lane] & path_flags::ANY_NON_SPECULAR == 0)
 }
 
 /// Whether the reflection at a vertex may show an emitter, if all glass is in slabs with the directions of this one.

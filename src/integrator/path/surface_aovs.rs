@@ -82,13 +82,13 @@ pub(super) fn write_miss(
     context: &Context,
     features: Option<Rgb>,
     direction: Vec3,
-    radiance: impl FnOnce() -> Rgb,
+    radiance: Rgb,
     surface: &mut SurfaceSample,
 ) {
     if context.bounce == 0 && context.config.surface_aovs.motion {
         surface.motion = context.pass.render.motion_at_infinity(direction).to_array();
     }
     if let Some(throughput) = features {
-        set_features(surface, throughput, radiance().map(|value| value.min(1.0)), Vec3::ZERO);
+        set_features(surface, throughput, radiance.map(|value| value.min(1.0)), Vec3::ZERO);
     }
 }

@@ -8,7 +8,7 @@ use crate::color::Rgb;
 use crate::geometry::{Hit, Mesh, Shape, TrianglePoints, interpolated_normal, interpolated_uv, uv_area, uv_density};
 use crate::id::ShapeId;
 use crate::integrator::shading::{adapted_normal, is_consistent};
-use crate::math::compact::{Compaction, collect_lanes, sort_lanes};
+use crate::math::compact::{Compaction, collect_lanes};
 use crate::math::prefetch::{address, prefetch_lines};
 use crate::math::rows::{BATCH, Element, Row, Vec3Rows, whole_vectors};
 use crate::math::vectorize::vectorize;
@@ -107,24 +107,20 @@ fn start_vertices(vertices: &mut Vertices, lanes: &Compaction, paths: &PathRows,
 /// Resolves hits on analytic shapes in the world that need no more than rows have, many on one shape at a time.
 fn resolve_analytic(context: &Context, vertices: &mut Vertices) {
     let Vertices { count, rows, points, triangles, analytic, .. } = vertices;
-    let AnalyticScratch { lanes, t_min, t, rays, ray_t, points: found, normals } = analytic;
-    collect_lanes(lanes, *count, |lane| {
-        let is_in_world = rows.is_unresolved[lane] != 0 && rows.instance[lane] == Hit::NO_INSTANCE.0;
-        is_in_world && context.world.resolves_in_rows(ShapeId(rows.shape[lane]))
-    });
-    sort_lanes(lanes, &rows.shape);
-    for lanes in lanes.chunk_by(|&a, &b| rows.shape[usize::from(a)] == rows.shape[usize::from(b)]) {
-        let Shape::Analytic(placed) = context.scene.geometry.shape(ShapeId(rows.shape[usize::from(lanes[0])])) else {
-            continue;
-        };
-        if lanes.len() < MIN_ANALYTIC_LANES {
+    let AnalyticScratch { t_min, t, rays, ray_t, points: found, normals } = analytic;
+    let open = Compaction::different(&rows.is_unresolved, 0, *count).and(&Compaction::equal(
+        &rows.instance,
+        Hit::NO_INSTANCE.0,
+        *count,
+    ));
+    for (shape, lanes) in open.groups(&rows.shape) {
+        let Shape::Analytic(placed) = context.scene.geometry.shape(ShapeId(shape)) else { continue };
+        if lanes.len() < MIN_ANALYTIC_LANES || !context.world.resolves_in_rows(ShapeId(shape)) {
             continue;
         }
-        for &lane in lanes {
-            let lane = usize::from(lane);
+        for lane in lanes.lanes() {
             (rows.error[lane], rows.uv_density[lane]) = (placed.error(), 0.0);
         }
-        let lanes = Compaction::of(lanes);
         lanes.compact_3(&triangles.origin.0, &mut rays.origin.0);
         lanes.compact_3(&rows.direction.0, &mut rays.direction.0);
         lanes.compact(t_min, &mut rays.t_min);

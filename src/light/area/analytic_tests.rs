@@ -1,10 +1,11 @@
 use std::f64::consts::{FRAC_PI_3, PI, TAU};
 
-use super::tests::{assert_power_flows_out, assert_samples_are_hits, irradiance, words};
+use super::tests::{assert_power_flows_out, assert_samples_are_hits, irradiance, queued_words, words};
 use super::*;
 use crate::geometry::{Disk, Frustum, Quad, Sphere};
 use crate::id::LightId;
-use crate::light::{Light, LightContext, LightQueries, LightSampleContext, LightSet, MisCompensation};
+use crate::light::queue::{LightSampleOutput, SampleGroup};
+use crate::light::{Light, LightContext, LightQueries, LightSampleContext, LightSampleRows, LightSet, MisCompensation};
 use crate::math::rows::{BATCH, DVec3Rows, Vec3Rows};
 use crate::math::{DAffine3, DMat3, Rng, Transform};
 use crate::sampling::SampleRows;
@@ -140,10 +141,9 @@ fn emitters_sampled_together_have_the_bits_of_those_sampled_alone() {
     let mut queue = EmitterQueue::default();
     let set = LightSet::new(lights.iter().cloned().map(Light::Area).collect(), &geometry);
     let context = LightContext { geometry: &geometry, textures: &[], lights: &set, compensation: MisCompensation::Off };
-    let mut points = DVec3Rows::ZERO;
+    let (mut points, mut ids) = (DVec3Rows::ZERO, [0; BATCH]);
     let mut sampled = 0;
     for kinds in [1, 2, 4, 4, 4, 4, lights.len()] {
-        queue.clear();
         let first = random.below(lights.len());
         let vertices: Vec<_> = (0..BATCH)
             .map(|_| ((first + random.below(kinds)) % lights.len(), random.cube() * 5.0 - 2.0, random.pair()))
@@ -151,19 +151,23 @@ fn emitters_sampled_together_have_the_bits_of_those_sampled_alone() {
         let numbers = SampleRows::new(&vertices.iter().map(|(_, _, [u, v])| [0.0, *u, *v, 0.0]).collect::<Vec<_>>());
         for (lane, (i, p, _)) in vertices.iter().enumerate() {
             points.set(lane, *p);
-            assert!(queue.push(&lights[*i], LightId::new(*i), lane));
+            ids[lane] = *i as u32;
         }
-        let mut found = vec![None; BATCH];
-        queue.sample(
-            &context,
-            &LightQueries { count: BATCH, points: &points, normals: &Vec3Rows::ZERO, u: &numbers },
-            |lane, sample| {
-                found[lane] = Some(*sample);
-            },
-        );
-        for ((i, p, u), found) in vertices.iter().zip(&found) {
+        let lanes_of = |group| -> Vec<u8> {
+            (0..BATCH as u8).filter(|&lane| lights[vertices[usize::from(lane)].0].sample_group() == group).collect()
+        };
+        let [spheres, others] = [SampleGroup::Spheres, SampleGroup::Shapes].map(lanes_of);
+        let (mut samples, mut target_p) = (LightSampleRows::default(), DVec3Rows::ZERO);
+        let out = &mut LightSampleOutput { pmfs: &[0.5; BATCH], samples: &mut samples, target_p: &mut target_p };
+        let queries = LightQueries { count: BATCH, points: &points, normals: &Vec3Rows::ZERO, u: &numbers };
+        queue.sample_spheres(&spheres, &ids, &context, &queries, out);
+        queue.sample_shapes(&others, &ids, &context, &queries, out);
+        let is_sampled: Vec<_> =
+            (0..BATCH as u8).map(|lane| spheres.contains(&lane) || others.contains(&lane)).collect();
+        for (lane, (i, p, u)) in vertices.iter().enumerate() {
             let alone = lights[*i].sample(&geometry, &[], &LightSampleContext::from_any_side(*p), *u);
-            assert_eq!(found.as_ref().map(words), alone.as_ref().map(words), "{i} {p} {u:?}");
+            let found = queued_words(&samples, &target_p, lane);
+            assert_eq!(found, alone.as_ref().map(words).filter(|_| is_sampled[lane]), "{i} {p} {u:?}");
             sampled += usize::from(found.is_some());
         }
     }

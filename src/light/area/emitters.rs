@@ -3,10 +3,11 @@
 use super::{AreaLight, EmitterSample, EmitterShape, SphereEmitter};
 use crate::geometry::{Geometry, Shape, WorldSampleRows};
 use crate::id::LightId;
-use crate::light::{Light, LightContext, LightQueries, LightSample};
+use crate::light::queue::LightSampleOutput;
+use crate::light::{Light, LightContext, LightQueries, LightSampleRows, light_target};
 use crate::math::DVec3;
-use crate::math::compact::sort_lanes;
-use crate::math::rows::{BATCH, Row, pair, soa, whole_vectors};
+use crate::math::compact::Compaction;
+use crate::math::rows::{BATCH, Element, Row, pair, soa, whole_vectors};
 use crate::math::vectorize::vectorize;
 
 soa! {
@@ -21,26 +22,41 @@ soa! {
     }
 }
 
+soa! {
+    /// Whole spheres that emit outwards.
+    struct SphereRows {
+        center: DVec3,
+        radius: f64,
+    }
+}
+
 /// Vertices that sample spheres and other analytic shapes, at most [`BATCH`].
 pub(in crate::light) struct EmitterQueue {
-    lanes: Vec<u8>,
-    /// Of each vertex, the light.
-    lights: Row<u32>,
+    /// The spheres of the vertices that sample any.
+    spheres: SphereRows,
     rows: EmitterRows,
 }
 
-/// Vertices with one light, with its samples.
+/// Vertices that are sampled at once, with their samples.
 struct EmitterRows {
     u: [Row; 2],
     views: ViewRows,
-    samples: WorldSampleRows,
+    points: WorldSampleRows,
+    /// Probability with which each light was chosen.
+    pmfs: Row,
+    samples: LightSampleRows,
 }
 
 impl Default for EmitterQueue {
     fn default() -> Self {
-        let rows =
-            EmitterRows { u: [[0.0; BATCH]; 2], views: ViewRows::default(), samples: WorldSampleRows::default() };
-        Self { lanes: Vec::with_capacity(BATCH), lights: [0; BATCH], rows }
+        let rows = EmitterRows {
+            u: [[0.0; BATCH]; 2],
+            views: ViewRows::default(),
+            points: WorldSampleRows::default(),
+            pmfs: [0.0; BATCH],
+            samples: LightSampleRows::default(),
+        };
+        Self { spheres: SphereRows::default(), rows }
     }
 }
 
@@ -48,47 +64,57 @@ impl Default for EmitterQueue {
 const MIN_LANES: usize = 3;
 
 impl EmitterQueue {
-    /// Empties the queue.
-    pub fn clear(&mut self) {
-        self.lanes.clear();
-    }
-
-    /// Queues the sample of a light for the vertex `lane`; `false` if the light is not sampled here.
-    #[inline(always)]
-    pub fn push(&mut self, light: &AreaLight, id: LightId, lane: usize) -> bool {
-        if !(light.emission.is_even()
-            && matches!(light.form, EmitterShape::Sphere(_) | EmitterShape::TransformedShape { .. }))
-        {
-            return false;
+    /// Samples the lights of vertices whose lights are all spheres.
+    pub fn sample_spheres(
+        &mut self,
+        lanes: &[u8],
+        lights: &Row<u32>,
+        context: &LightContext,
+        queries: &LightQueries,
+        out: &mut LightSampleOutput,
+    ) {
+        let Self { spheres, rows } = self;
+        for (i, &lane) in lanes.iter().enumerate() {
+            if let Light::Area(light) = context.lights.get(LightId(lights[usize::from(lane)]))
+                && let EmitterShape::Sphere(sphere) = &light.form
+            {
+                spheres.center.set(i, sphere.center);
+                spheres.radius[i] = sphere.radius;
+                rows.samples.radiance.set(i, light.emission.radiance);
+            }
         }
-        self.lanes.push(lane as u8);
-        self.lights[lane] = id.0;
-        true
+        if !lanes.is_empty() {
+            let lanes = Compaction::of(lanes);
+            rows.gather(&lanes, queries, out.pmfs);
+            vectorize!(sample_spheres(spheres, &rows.u, &mut rows.views, lanes.len()));
+            rows.finish(&lanes, true, out);
+        }
     }
 
-    /// Samples all lights; `set` takes each sample with its vertex.
-    pub fn sample(&mut self, context: &LightContext, queries: &LightQueries, mut set: impl FnMut(usize, &LightSample)) {
-        let Self { lanes, lights, rows } = self;
-        sort_lanes(lanes, lights);
-        for group in lanes.chunk_by(|&a, &b| lights[usize::from(a)] == lights[usize::from(b)]) {
-            let Light::Area(light) = context.lights.get(LightId(lights[usize::from(group[0])])) else { continue };
-            let is_in_rows = group.len() >= MIN_LANES && {
-                for (i, &lane) in group.iter().enumerate() {
-                    let (p, [s, t]) = queries.get(usize::from(lane));
-                    rows.views.p.set(i, p);
-                    (rows.u[0][i], rows.u[1][i]) = (s, t);
+    /// Samples the lights of vertices whose lights are all other analytic shapes.
+    pub fn sample_shapes(
+        &mut self,
+        lanes: &[u8],
+        lights: &Row<u32>,
+        context: &LightContext,
+        queries: &LightQueries,
+        out: &mut LightSampleOutput,
+    ) {
+        let rows = &mut self.rows;
+        for (id, lanes) in Compaction::of(lanes).groups(lights) {
+            let Light::Area(light) = context.lights.get(LightId(id)) else { continue };
+            if lanes.len() >= MIN_LANES {
+                rows.gather(&lanes, queries, out.pmfs);
+                if rows.sample_shape(light, context.geometry, lanes.len()) {
+                    rows.finish(&lanes, light.emission.two_sided, out);
+                    continue;
                 }
-                rows.sample(light, context.geometry, group.len())
-            };
-            for (i, lane) in group.iter().map(|&lane| usize::from(lane)).enumerate() {
+            }
+            for lane in lanes.lanes() {
                 let (_, u) = queries.get(lane);
-                let sample = if is_in_rows {
-                    sample_of_row(light, &rows.views, i)
-                } else {
-                    light.sample(context.geometry, context.textures, &queries.light_context(lane), u)
-                };
-                if let Some(sample) = sample {
-                    set(lane, &sample);
+                if let Some(sample) = light.sample(context.geometry, context.textures, &queries.light_context(lane), u)
+                {
+                    out.set(lane, &sample);
                 }
             }
         }
@@ -96,50 +122,68 @@ impl EmitterQueue {
 }
 
 impl EmitterRows {
-    /// Samples a light for the first `count` vertices; `false` if it has to be sampled alone.
-    fn sample(&mut self, light: &AreaLight, geometry: &Geometry, count: usize) -> bool {
-        let Self { u, views, samples } = self;
-        match (&light.form, geometry.shape(light.shape)) {
-            (EmitterShape::Sphere(sphere), _)
-                if !sphere.inward && (0..count.min(BATCH)).all(|i| sphere.sees_front(views.p.get(i))) =>
-            {
-                vectorize!(sample_sphere(sphere, u, views, count));
-                true
-            }
-            (EmitterShape::TransformedShape { .. }, Shape::Analytic(placed)) if placed.samples_in_rows() => {
-                placed.sample_area_rows(u, count, samples);
-                vectorize!(see_samples(samples, views, count));
-                true
-            }
-            _ => false,
+    /// Copies what samples depend on.
+    fn gather(&mut self, lanes: &Compaction, queries: &LightQueries, pmfs: &Row) {
+        let [_, u, v, _] = queries.u.numbers();
+        lanes.compact(u, &mut self.u[0]);
+        lanes.compact(v, &mut self.u[1]);
+        lanes.compact(pmfs, &mut self.pmfs);
+        lanes.compact_3(&queries.points.0, &mut self.views.p.0);
+    }
+
+    /// Samples a light that is no sphere for the first `count` vertices; `false` if it has to be sampled alone.
+    fn sample_shape(&mut self, light: &AreaLight, geometry: &Geometry, count: usize) -> bool {
+        let Self { u, views, points, samples, .. } = self;
+        let Shape::Analytic(placed) = geometry.shape(light.shape) else { return false };
+        if !placed.samples_in_rows() {
+            return false;
         }
+        placed.sample_area_rows(u, count, points);
+        vectorize!(see_points(points, views, count));
+        for (row, value) in samples.radiance.0.iter_mut().zip(light.emission.radiance.to_array()) {
+            row[..count].fill(value);
+        }
+        true
+    }
+
+    /// Writes the samples, whose radiance is set.
+    fn finish(&mut self, lanes: &Compaction, is_any_side_seen: bool, out: &mut LightSampleOutput) {
+        let Self { views, pmfs, samples, .. } = self;
+        vectorize!(set_samples(views, pmfs, is_any_side_seen, samples, lanes.len()));
+        out.expand(lanes, samples, &views.q);
     }
 }
 
-/// The sample of one of the points.
-fn sample_of_row(light: &AreaLight, views: &ViewRows, i: usize) -> Option<LightSample> {
-    let (n, wi, pdf) = (views.n.get(i).as_vec3(), views.wi.get(i).as_vec3(), views.pdf[i] as f32);
-    let sample = EmitterSample { p: views.q.get(i), n, wi, pdf }.if_valid()?;
-    let is_seen = light.emission.two_sided || matches!(light.form, EmitterShape::Sphere(_)) || wi.dot(n) < 0.0;
-    is_seen.then(|| sample.with_radiance(light.emission.radiance, 0.0))
+#[inline(always)]
+fn set_samples(views: &ViewRows, pmfs: &Row, is_any_side_seen: bool, samples: &mut LightSampleRows, count: usize) {
+    for i in 0..whole_vectors(count) {
+        let (n, wi, pdf) = (views.n.get(i).as_vec3(), views.wi.get(i).as_vec3(), views.pdf[i] as f32);
+        let is_sampled = EmitterSample::is_density(pdf) & (is_any_side_seen | (wi.dot(n) < 0.0));
+        samples.target[i] = if is_sampled { light_target::POINT } else { light_target::NONE };
+        samples.direction.set(i, wi);
+        samples.pdf[i] = pdf * <f32 as Element>::get(pmfs, i);
+        samples.target_n.set(i, n);
+    }
 }
 
 #[inline(always)]
-fn sample_sphere(sphere: &SphereEmitter, u: &[Row; 2], views: &mut ViewRows, count: usize) {
+fn sample_spheres(spheres: &SphereRows, u: &[Row; 2], views: &mut ViewRows, count: usize) {
     for i in 0..whole_vectors(count) {
-        let point = sphere.sample_from_outside(views.p.get(i), pair(u, i));
+        let sphere = SphereEmitter { center: spheres.center.get(i), radius: spheres.radius[i], inward: false };
+        let p = views.p.get(i);
+        let point = sphere.sample_from_outside(p, pair(u, i));
         views.q.set(i, point.q);
         views.n.set(i, point.n);
         views.wi.set(i, point.wi);
-        views.pdf[i] = point.pdf;
+        views.pdf[i] = if sphere.sees_front(p) { point.pdf } else { 0.0 };
     }
 }
 
 #[inline(always)]
-fn see_samples(samples: &WorldSampleRows, views: &mut ViewRows, count: usize) {
+fn see_points(points: &WorldSampleRows, views: &mut ViewRows, count: usize) {
     for i in 0..whole_vectors(count) {
-        let (q, n) = (samples.p.get(i), samples.n.get(i));
-        let (wi, pdf) = EmitterSample::direction_and_pdf(views.p.get(i), q, n, samples.pdf_area[i]);
+        let (q, n) = (points.p.get(i), points.n.get(i));
+        let (wi, pdf) = EmitterSample::direction_and_pdf(views.p.get(i), q, n, points.pdf_area[i]);
         views.q.set(i, q);
         views.n.set(i, n);
         views.wi.set(i, wi);

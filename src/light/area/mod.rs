@@ -20,6 +20,7 @@ use triangle::triangle_error;
 pub(crate) use triangle::triangle_point;
 
 use super::bounds::{EmissionCone, LightBounds, to_positive};
+use super::queue::SampleGroup;
 use super::{LightSample, LightSampleContext, ShadowTarget};
 use crate::color::Rgb;
 use crate::geometry::{Analytic, Geometry, Mesh, Shape, SpawnPoint, SurfaceInteraction, TransformedShape};
@@ -141,7 +142,13 @@ impl EmitterSample {
     /// `None` without a finite density. A NaN, where both points are one, is no sample either.
     #[inline]
     fn if_valid(self) -> Option<Self> {
-        (self.pdf > 0.0 && self.pdf < f32::INFINITY).then_some(self)
+        Self::is_density(self.pdf).then_some(self)
+    }
+
+    /// Whether a density is positive and finite.
+    #[inline(always)]
+    fn is_density(pdf: f32) -> bool {
+        (pdf > 0.0) & (pdf < f32::INFINITY)
     }
 
     /// Light of this radiance from the point, which has this error of its position.
@@ -285,12 +292,14 @@ impl AreaLight {
         }
     }
 
-    /// The parallelogram, if the light is an even one.
-    #[inline]
-    fn even_parallelogram(&self) -> Option<&ParallelogramEmitter> {
+    /// With which lights it is sampled for many vertices at once.
+    pub(super) fn sample_group(&self) -> SampleGroup {
         match &self.form {
-            EmitterShape::Parallelogram(quad) if self.emission.is_even() => Some(quad),
-            _ => None,
+            _ if !self.emission.is_even() => SampleGroup::Alone,
+            EmitterShape::Parallelogram(_) => SampleGroup::Parallelograms,
+            EmitterShape::Sphere(sphere) if !sphere.inward && !self.emission.two_sided => SampleGroup::Spheres,
+            EmitterShape::TransformedShape { .. } => SampleGroup::Shapes,
+            EmitterShape::Sphere(_) | EmitterShape::Triangle { .. } => SampleGroup::Alone,
         }
     }
 

@@ -1,10 +1,10 @@
 //! Area lights that many vertices sample at once.
 
-use super::AreaLight;
 use super::parallelogram::{ParallelogramRows, ParallelogramSample};
+use super::{AreaLight, EmitterShape};
 use crate::color::Rgb;
 use crate::id::LightId;
-use crate::light::{LightQueries, LightSampleRows, light_target};
+use crate::light::{Light, LightQueries, LightSampleRows, LightSet, light_target};
 use crate::math::DVec3;
 use crate::math::rows::{BATCH, DVec3Rows, Element, Row, pair, soa, whole_vectors};
 use crate::math::vectorize::vectorize;
@@ -120,26 +120,26 @@ impl AreaQueue {
         self.ids = [NO_LIGHT; BATCH];
     }
 
-    /// Empties the queue.
-    pub fn clear(&mut self) {
-        self.count = 0;
+    /// Queues the samples of parallelograms for vertices, in place of those before.
+    pub fn queue(&mut self, lights: &LightSet, lanes: &[u8], ids: &Row<u32>) {
+        self.count = lanes.len();
         self.emissions.is_queued = [0; BATCH];
-    }
-
-    /// Queues the sample of a light for the vertex `lane`; `false` if the light is not sampled here.
-    #[inline(always)]
-    pub fn push(&mut self, light: &AreaLight, id: LightId, lane: usize) -> bool {
-        let Some(quad) = light.even_parallelogram() else { return false };
-        self.count += 1;
-        self.emissions.is_queued[lane] = 1;
-        if self.ids[lane] != id.0 {
-            self.ids[lane] = id.0;
-            self.emissions.radiance.set(lane, light.emission.radiance);
-            (self.emissions.error[lane], self.emissions.two_sided[lane]) =
-                (quad.error, u32::from(light.emission.two_sided));
-            self.shapes.set(lane, &quad.shape);
+        for lane in lanes.iter().map(|&lane| usize::from(lane)) {
+            self.emissions.is_queued[lane] = 1;
+            let id = ids[lane];
+            if self.ids[lane] == id {
+                continue;
+            }
+            if let Light::Area(AreaLight { emission, form: EmitterShape::Parallelogram(quad), .. }) =
+                lights.get(LightId(id))
+            {
+                self.ids[lane] = id;
+                self.emissions.radiance.set(lane, emission.radiance);
+                (self.emissions.error[lane], self.emissions.two_sided[lane]) =
+                    (quad.error, u32::from(emission.two_sided));
+                self.shapes.set(lane, &quad.shape);
+            }
         }
-        true
     }
 
     /// Samples all lights. Samples and targets of vertices that are not queued are overwritten, with no sample.

@@ -16,13 +16,13 @@ pub(super) struct SphereEmitter {
 
 impl SphereEmitter {
     /// Whether `p` sees the front.
-    #[inline]
+    #[inline(always)]
     pub fn sees_front(&self, p: DVec3) -> bool {
         self.is_outside((p - self.center).length_squared()) != self.inward
     }
 
     /// Whether a point at this squared distance from the centre lies outside by more than the rounding of the distance.
-    #[inline]
+    #[inline(always)]
     fn is_outside(&self, distance_squared: f64) -> bool {
         distance_squared > self.radius * self.radius * (1.0 + 8.0 * f64::EPSILON)
     }

@@ -1,9 +1,8 @@
 use std::f64::consts::{PI, TAU};
 
 use super::*;
-use crate::id::LightId;
 use crate::light::test_support::assert_chi_squared;
-use crate::light::{LightQueries, LightSampleContext, LightSampleRows, light_target};
+use crate::light::{Light, LightQueries, LightSampleContext, LightSampleRows, LightSet, light_target};
 use crate::math::Rng;
 use crate::math::rows::{BATCH, DVec3Rows, Vec3Rows};
 use crate::sampling::SampleRows;
@@ -177,6 +176,25 @@ pub(super) fn words(sample: &LightSample) -> (Vec3, Rgb, f32, DVec3, Vec3, f32) 
     (sample.wi, sample.radiance, sample.pdf, target.p, target.n, target.error)
 }
 
+/// The same of a sample in rows whose light was chosen with a probability of a half.
+pub(super) fn queued_words(
+    samples: &LightSampleRows,
+    target_p: &DVec3Rows,
+    lane: usize,
+) -> Option<(Vec3, Rgb, f32, DVec3, Vec3, f32)> {
+    (samples.target[lane] == light_target::POINT).then(|| {
+        assert_eq!(samples.is_delta[lane], 0);
+        (
+            samples.direction.get(lane),
+            samples.radiance.get(lane),
+            2.0 * samples.pdf[lane],
+            target_p.get(lane),
+            samples.target_n.get(lane),
+            samples.target_error[lane],
+        )
+    })
+}
+
 #[test]
 fn queued_samples_have_the_bits_of_single_ones() {
     let geometry = ceiling();
@@ -187,9 +205,9 @@ fn queued_samples_have_the_bits_of_single_ones() {
     lights.extend(AreaLight::for_shape(ShapeId(0), WHITE, &skewed, &[]));
     let mut random = Rng::new(13);
     let mut queue = AreaQueue::default();
-    let (mut points, mut normals) = (DVec3Rows::ZERO, Vec3Rows::ZERO);
+    let set = LightSet::new(lights.iter().cloned().map(Light::Area).collect(), &geometry);
+    let (mut points, mut normals, mut ids) = (DVec3Rows::ZERO, Vec3Rows::ZERO, [0; BATCH]);
     for count in [1, 16, 100, BATCH] {
-        queue.clear();
         let mut normal =
             |i: usize| if i.is_multiple_of(3) { Vec3::ZERO } else { random.direction().as_vec3().normalize() };
         let normal_of: Vec<_> = (0..count).map(&mut normal).collect();
@@ -201,8 +219,10 @@ fn queued_samples_have_the_bits_of_single_ones() {
         for (lane, (i, p, _)) in vertices.iter().enumerate() {
             points.set(lane, *p);
             normals.set(lane, normal_of[lane]);
-            assert!(!is_queued(lane) || queue.push(&lights[*i], LightId::new(*i), lane));
+            ids[lane] = *i as u32;
         }
+        let lanes: Vec<u8> = (0..count as u8).filter(|&lane| is_queued(usize::from(lane))).collect();
+        queue.queue(&set, &lanes, &ids);
         let (mut samples, mut target_p) = (LightSampleRows::default(), DVec3Rows::ZERO);
         queue.sample(
             &LightQueries { count, points: &points, normals: &normals, u: &numbers },
@@ -212,18 +232,7 @@ fn queued_samples_have_the_bits_of_single_ones() {
         );
         let mut sampled = 0;
         for (lane, (i, p, u)) in vertices.iter().enumerate() {
-            let found = (samples.target[lane] == light_target::POINT).then(|| {
-                let normal_and_error = (samples.target_n.get(lane), samples.target_error[lane]);
-                assert_eq!(samples.is_delta[lane], 0);
-                (
-                    samples.direction.get(lane),
-                    samples.radiance.get(lane),
-                    2.0 * samples.pdf[lane],
-                    target_p.get(lane),
-                    normal_and_error.0,
-                    normal_and_error.1,
-                )
-            });
+            let found = queued_words(&samples, &target_p, lane);
             let alone = lights[*i].sample(&geometry, &[], &LightSampleContext { p: *p, n: normal_of[lane] }, *u);
             assert_eq!(found, alone.as_ref().map(words).filter(|_| is_queued(lane)), "{i} {p} {u:?}");
             sampled += usize::from(found.is_some());
