@@ -130,7 +130,7 @@ impl Filter {
 
     /// Where a sample lies: uniform within the pixel if samples are shared, else in proportion to the filter's absolute
     /// value.
-    #[inline]
+    #[inline(always)]
     pub fn sample(&self, u: [f32; 2]) -> FilterSample {
         if self.is_shared() {
             return FilterSample { offset: Vec2::new(u[0] - 0.5, u[1] - 0.5), weight: 1.0 };
@@ -297,7 +297,7 @@ impl SharedWeights {
 }
 
 /// Inverts the distribution of a tent on `[-1, 1]`.
-#[inline]
+#[inline(always)]
 fn tent(u: f32) -> f32 {
     let v = 2.0 * u - 1.0;
     (1.0 - (1.0 - v.abs()).sqrt()).copysign(v)

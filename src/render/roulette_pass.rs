@@ -9,7 +9,7 @@ use super::TILE_SIZE;
 use super::tile_renderer::{TileRenderer, TileWorkspace};
 use crate::integrator::{ContinuationGrid, PilotRecords, RayCounts, dimensions};
 use crate::math::Vec2;
-use crate::math::rows::{BATCH, Row};
+use crate::math::rows::{BATCH, Row, whole_vectors};
 use crate::math::vectorize::vectorize;
 use crate::sampling::PixelSeed;
 
@@ -163,10 +163,10 @@ impl PixelScales {
     }
 
     /// Between the centres of cells.
-    fn set(&self, pixels: &[[u32; 2]], scales: &mut Row) {
+    fn set(&self, pixels: &[Row<u32>; 2], count: usize, scales: &mut Row) {
         let mut cells = CellRows { cell: [0; BATCH], x: [0.0; BATCH], y: [0.0; BATCH] };
-        vectorize!(find_cells(self.size, self.cells_per_pixel, pixels, &mut cells));
-        for (i, scale) in scales.iter_mut().enumerate().take(pixels.len()) {
+        vectorize!(find_cells(self.size, self.cells_per_pixel, pixels, &mut cells, count));
+        for (i, scale) in scales.iter_mut().enumerate().take(count) {
             let [a, b, c, d] = self.scales[cells.cell[i] as usize];
             let (above, below) = (a + cells.x[i] * (b - a), c + cells.x[i] * (d - c));
             *scale = above + cells.y[i] * (below - above);
@@ -175,9 +175,10 @@ impl PixelScales {
 }
 
 #[inline(always)]
-fn find_cells(size: [u32; 2], cells_per_pixel: Vec2, pixels: &[[u32; 2]], cells: &mut CellRows) {
+fn find_cells(size: [u32; 2], cells_per_pixel: Vec2, pixels: &[Row<u32>; 2], cells: &mut CellRows, count: usize) {
     let [last_x, last_y] = size.map(|count| (count - 1) as f32);
-    for (i, &[x, y]) in pixels.iter().enumerate().take(BATCH) {
+    for i in 0..whole_vectors(count) {
+        let [x, y] = [pixels[0][i], pixels[1][i]];
         // Beyond the left and the upper edge of the view coordinates wrap.
         let x = ((x as i32 as f32 + 0.5) * cells_per_pixel.x - 0.5).clamp(0.0, last_x);
         let y = ((y as i32 as f32 + 0.5) * cells_per_pixel.y - 0.5).clamp(0.0, last_y);
@@ -260,8 +261,8 @@ impl RouletteEstimates {
     }
 
     /// Sets what roulette multiplies the throughputs of the paths of pixels by.
-    pub fn set_scales(&self, pixels: &[[u32; 2]], scales: &mut Row) {
-        self.pixels.set(pixels, scales);
+    pub fn set_scales(&self, pixels: &[Row<u32>; 2], count: usize, scales: &mut Row) {
+        self.pixels.set(pixels, count, scales);
     }
 }
 

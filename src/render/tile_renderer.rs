@@ -20,7 +20,8 @@ use crate::integrator::{
     SurfaceAovs, Workspace, World, dimensions,
 };
 use crate::math::Vec2;
-use crate::math::rows::{BATCH, Row, pair};
+use crate::math::rows::{BATCH, Row, pair, whole_vectors};
+use crate::math::vectorize::vectorize;
 use crate::sampling::{PixelSeed, SampleIdRows, SampleRows, Sampler};
 use crate::scene::Scene;
 
@@ -66,7 +67,8 @@ pub(super) struct TileWorkspace {
     /// What they add to one plane of the film.
     terms: Vec<f64>,
     pub splats: Splats,
-    pixels: [[u32; 2]; BATCH],
+    /// Coordinates of pixels.
+    pixels: [Row<u32>; 2],
     /// Points of the film.
     film: [Row; 2],
     numbers: SampleRows,
@@ -83,11 +85,44 @@ impl Default for TileWorkspace {
             placed: Vec::with_capacity(count),
             terms: Vec::with_capacity(4 * count),
             splats: Splats::default(),
-            pixels: [[0; 2]; BATCH],
+            pixels: [[0; BATCH]; 2],
             film: [[0.0; BATCH]; 2],
             numbers: SampleRows::default(),
             integrator: Workspace::default(),
         }
+    }
+}
+
+/// Finds the seeds of pixels, whose coordinates become those of what the camera shows; beyond its left and upper edge
+/// they wrap.
+#[inline(always)]
+fn seed_pixels(
+    sampler: &Sampler,
+    first: u32,
+    [x, y]: &mut [Row<u32>; 2],
+    seeds: &mut [PixelSeed; BATCH],
+    count: usize,
+) {
+    for i in 0..whole_vectors(count) {
+        (x[i], y[i]) = (x[i].wrapping_sub(first), y[i].wrapping_sub(first));
+        seeds[i] = sampler.pixel(x[i], y[i]);
+    }
+}
+
+/// Places samples in their pixels, and finds their points of the film.
+#[inline(always)]
+fn place_samples(
+    filter: &Filter,
+    numbers: &SampleRows,
+    [x, y]: &[Row<u32>; 2],
+    places: &mut [FilterSample],
+    [film_x, film_y]: &mut [Row; 2],
+) {
+    for (i, place) in places.iter_mut().enumerate().take(BATCH) {
+        let [u, v, ..] = numbers.of(i);
+        *place = filter.sample([u, v]);
+        film_x[i] = x[i] as i32 as f32 + 0.5 + place.offset.x;
+        film_y[i] = y[i] as i32 as f32 + 0.5 + place.offset.y;
     }
 }
 
@@ -285,16 +320,9 @@ impl<'a> TileRenderer<'a> {
                 break;
             }
             self.sampler.sample_4d_batch(&block.requests, count, dimensions::CAMERA, numbers);
-            for i in 0..count {
-                let u = numbers.of(i);
-                let filter = self.filter.sample([u[0], u[1]]);
-                places[start + i] = filter;
-                for (k, offset) in filter.offset.to_array().into_iter().enumerate() {
-                    film[k][i] = pixels[i][k] as i32 as f32 + 0.5 + offset;
-                }
-            }
+            vectorize!(place_samples(&self.filter, numbers, pixels, &mut places[start..start + count], film));
             if let Some(roulette) = &self.roulette {
-                roulette.set_scales(&pixels[..count], &mut block.rr_scale);
+                roulette.set_scales(pixels, count, &mut block.rr_scale);
             }
             self.camera_rays(count, film, numbers, block);
             camera_batch.extend(count);
@@ -312,18 +340,16 @@ impl<'a> TileRenderer<'a> {
     fn request(
         &self,
         samples: &mut impl Iterator<Item = ([u32; 2], u32)>,
-        pixels: &mut [[u32; 2]; BATCH],
+        pixels: &mut [Row<u32>; 2],
         requests: &mut SampleIdRows,
     ) -> usize {
         let mut count = 0;
         for ([x, y], sample) in samples.take(BATCH) {
-            // Of what the camera shows; beyond its left and upper edge coordinates wrap.
-            let [x, y] = [x, y].map(|x| x.wrapping_sub(self.grid.offset + self.overscan));
-            pixels[count] = [x, y];
-            requests.pixels[count] = self.sampler.pixel(x, y);
-            requests.samples[count] = sample;
+            (pixels[0][count], pixels[1][count], requests.samples[count]) = (x, y, sample);
             count += 1;
         }
+        let first = self.grid.offset + self.overscan;
+        vectorize!(seed_pixels(&self.sampler, first, pixels, &mut requests.pixels, count));
         count
     }
 

@@ -54,7 +54,7 @@ impl Sampler {
     }
 
     /// The seed of a pixel.
-    #[inline]
+    #[inline(always)]
     pub fn pixel(&self, x: u32, y: u32) -> PixelSeed {
         let pixel = u64::from(y) << 32 | u64::from(x);
         PixelSeed((hash64(self.seed ^ pixel) >> 32) as u32)
