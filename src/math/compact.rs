@@ -395,22 +395,21 @@ impl Compaction {
     ) {
         for (&bits, numbers) in self.masks.iter().zip(from.as_chunks::<WIDTH>().0).take(self.used) {
             let count = bits.count_ones() as usize;
-            // Of a length that the compiler knows: else each is a call.
-            let whole = if at < BATCH {
-                to.get_mut(at..).and_then(<[T]>::first_chunk_mut::<WIDTH>)
-            } else {
-                next.as_mut().and_then(|next| next.get_mut(at - BATCH..)).and_then(<[T]>::first_chunk_mut::<WIDTH>)
-            };
-            if let Some(whole) = whole {
+            let (row, first) = if at < BATCH { (Some(&mut *to), at) } else { (next.as_deref_mut(), at - BATCH) };
+            let Some(row) = row else { return };
+            if let Some(whole) = row.get_mut(first..).and_then(<[T]>::first_chunk_mut::<WIDTH>) {
                 T::compress(by, bits, numbers, whole);
             } else {
-                // Through memory, which waits for its own stores.
+                let room = BATCH.saturating_sub(first);
                 let mut compressed = [T::default(); WIDTH];
                 T::compress(by, bits, numbers, &mut compressed);
-                for (at, number) in (at..).zip(&compressed[..count]) {
-                    if let Some(to) = place(to, next.as_deref_mut(), at) {
-                        *to = *number;
-                    }
+                if let Some(last) = row.last_chunk_mut::<WIDTH>() {
+                    T::expand(by, (u32::from(u16::MAX) << (WIDTH - room)) as u16, &compressed, last);
+                }
+                if count > room
+                    && let Some(first) = next.as_mut().and_then(|next| next.first_chunk_mut::<WIDTH>())
+                {
+                    T::compress(by, without_lowest(bits, room), numbers, first);
                 }
             }
             at += count;
@@ -472,6 +471,12 @@ impl Compaction {
     pub fn expand_3<T: Compact>(&self, from: &[Row<T>; 3], to: &mut [Row<T>; 3]) {
         (0..3).for_each(|k| self.expand(&from[k], &mut to[k]));
     }
+}
+
+/// Without as many of the lowest bits that are set.
+#[inline(always)]
+fn without_lowest(bits: u16, count: usize) -> u16 {
+    (0..count).fold(bits, |bits, _| bits & bits.wrapping_sub(1))
 }
 
 /// The masks of the first lanes with such numbers, in `used` vectors.
