@@ -10,7 +10,8 @@ use super::{Accelerator, Coherence, HitRows, intersect_in_rows};
 use crate::error::Result;
 use crate::geometry::{Geometry, Hit, Shape};
 use crate::id::{PrimId, ShapeId};
-use crate::math::rows::BATCH;
+use crate::math::rows::{BATCH, Row, whole_vectors};
+use crate::math::vectorize::vectorize;
 use crate::math::{Aabb, Ray, RayRows};
 
 /// The most triangles of a mesh that is traced in packets: a floor, or walls.
@@ -101,6 +102,52 @@ impl<'g> HybridAccel<'g> {
     }
 }
 
+/// Which hits are nearer.
+struct NearerRows {
+    /// 1 where the hit on a shape in packets is, else 0.
+    shape: Row<u32>,
+    /// 1 where the distance in `f64` decides, else 0.
+    is_open: Row<u32>,
+}
+
+/// Ends rays where they hit shapes in packets.
+#[inline(always)]
+fn shorten(t_max: &mut Row, shapes: &Row<u32>, ends: &Row, count: usize) {
+    for i in 0..whole_vectors(count) {
+        t_max[i] = if shapes[i] == HitRows::MISS { t_max[i] } else { ends[i] };
+    }
+}
+
+/// Compares hits on shapes in packets with hits on others; true if any comparison is open.
+#[inline(always)]
+fn find_nearer(on_shapes: &HitRows, on_others: &HitRows, nearer: &mut NearerRows, count: usize) -> bool {
+    let mut is_any_open = 0;
+    for i in 0..count.min(BATCH) {
+        let is_on_shape = on_shapes.shape[i] != HitRows::MISS;
+        let is_on_other = on_others.shape[i] != HitRows::MISS;
+        let is_other_nearer = is_on_other & (on_others.t[i] < on_shapes.t[i]);
+        nearer.shape[i] = u32::from(is_on_shape & !is_other_nearer);
+        nearer.is_open[i] = u32::from(is_on_shape & is_on_other & !is_other_nearer);
+        is_any_open |= nearer.is_open[i];
+    }
+    is_any_open != 0
+}
+
+/// Replaces hits by those that are nearer.
+#[inline(always)]
+fn take_nearer(from: &HitRows, is_nearer: &Row<u32>, hits: &mut HitRows, count: usize) {
+    for i in 0..whole_vectors(count) {
+        let is_taken = is_nearer[i] != 0;
+        let choose = |a: f32, b: f32| if is_taken { a } else { b };
+        (hits.t[i], hits.u[i], hits.v[i]) =
+            (choose(from.t[i], hits.t[i]), choose(from.u[i], hits.u[i]), choose(from.v[i], hits.v[i]));
+        let choose = |a: u32, b: u32| if is_taken { a } else { b };
+        hits.shape[i] = choose(from.shape[i], hits.shape[i]);
+        hits.prim[i] = choose(from.prim[i], hits.prim[i]);
+        hits.instance[i] = choose(from.instance[i], hits.instance[i]);
+    }
+}
+
 /// Whether a shape of the world is traced in packets.
 pub(super) fn is_traced_in_packets(geometry: &Geometry, id: ShapeId) -> bool {
     matches!(geometry.shape(id), Shape::Analytic(placed) if has_intervals(&placed.shape))
@@ -157,22 +204,17 @@ impl Accelerator for HybridAccel<'_> {
             return self.others.intersect_rows(rays, count, hits, coherence);
         }
         let mut rest = rays.clone();
-        for (lane, &end) in ends[..count].iter().enumerate() {
-            if on_shapes.shape[lane] != HitRows::MISS {
-                rest.t_max[lane] = end;
-            }
-        }
+        vectorize!(shorten(&mut rest.t_max, &on_shapes.shape, &ends, count));
         self.others.intersect_rows(&rest, count, hits, coherence);
-        for lane in 0..count {
-            let Some(hit) = on_shapes.get(lane) else { continue };
-            // Within the limits of the distance to the shape, that in `f64` decides.
-            let is_first = hits.shape[lane] != HitRows::MISS
-                && (hits.t[lane] < hit.t
-                    || packets.exact_distance(hit.shape, &rays.get(lane)).is_some_and(|t| hits.t[lane] < t));
-            if !is_first {
-                hits.set(lane, Some(hit));
+        let mut order = NearerRows { shape: [0; BATCH], is_open: [0; BATCH] };
+        if vectorize!(find_nearer(&on_shapes, hits, &mut order, count)) {
+            for lane in (0..count).filter(|&lane| order.is_open[lane] != 0) {
+                // Within the limits of the distance to the shape, that in `f64` decides.
+                let exact = packets.exact_distance(ShapeId(on_shapes.shape[lane]), &rays.get(lane));
+                order.shape[lane] = u32::from(!exact.is_some_and(|t| hits.t[lane] < t));
             }
         }
+        vectorize!(take_nearer(&on_shapes, &order.shape, hits, count));
     }
 
     fn occluded_rows(&self, rays: &RayRows, count: usize, occluded: &mut [bool; BATCH], coherence: Coherence) {
