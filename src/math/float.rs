@@ -22,8 +22,10 @@ pub const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
 pub fn floor(x: f32) -> f32 {
     /// Numbers from this magnitude on are integers.
     const WHOLE: f32 = 8_388_608.0;
-    let towards_zero = x as i32 as f32;
-    let floor = if towards_zero > x { towards_zero - 1.0 } else { towards_zero };
+    // No conversion to integers: one that saturates is not compiled to vector code.
+    let shift = WHOLE.copysign(x);
+    let rounded = (x + shift) - shift;
+    let floor = if rounded > x { rounded - 1.0 } else { rounded };
     if x.abs() < WHOLE { floor } else { x }
 }
 

@@ -351,9 +351,12 @@ mod tests {
     #[test]
     fn scales_are_those_of_cells_at_their_centres_and_lie_between_elsewhere() {
         let scales = PixelScales::new([2, 2], Vec2::new(0.2, 0.2), &[1.0, 2.0, 3.0, 4.0]);
-        let mut of_pixels = [0.0; BATCH];
         let pixels = [[2, 2], [7, 2], [2, 7], [7, 7], [4, 2], [2, 4], [u32::MAX, 0], [100, 100], [0, 100]];
-        scales.set(&pixels, &mut of_pixels);
+        let (mut rows, mut of_pixels): ([Row<u32>; 2], Row) = ([[0; BATCH]; 2], [0.0; BATCH]);
+        for (i, [x, y]) in pixels.into_iter().enumerate() {
+            (rows[0][i], rows[1][i]) = (x, y);
+        }
+        scales.set(&rows, pixels.len(), &mut of_pixels);
         for (found, expected) in of_pixels.into_iter().zip([1.0, 2.0, 3.0, 4.0, 1.4, 1.8, 1.0, 4.0, 3.0]) {
             assert!((found - expected).abs() < 1e-6, "{found} {expected}");
         }

@@ -267,14 +267,19 @@ impl<A: Answers> Tracer<'_, '_, '_, A> {
         prefetch_lines(select_unpredictable(is_node, node, block), PREFETCHED_LINES);
     }
 
+    #[inline(always)]
+    fn triangle_ray(&self, lane: usize) -> TriangleRay {
+        let Scratch { prepared, t_max, .. } = &*self.scratch;
+        let (t_min, t_max) = (self.batch.rays.t_min[lane].into(), t_max[lane].into());
+        TriangleRay { kz: prepared.axes[lane], shear: prepared.shears.get(lane), t_min, t_max }
+    }
+
     /// Tests up to four triangles. True if the ray is answered.
     #[inline(always)]
     fn test_block<L: SimdIsa, const ANY: bool>(&mut self, lanes: L, block: &Block, lane: usize) -> bool {
+        let ray = self.triangle_ray(lane);
         let scratch = &mut *self.scratch;
         let (rays, geometry) = (self.batch.rays, self.batch.accel.geometry());
-        let (t_min, t_max) = (rays.t_min[lane].into(), scratch.t_max[lane].into());
-        let ray =
-            TriangleRay { kz: scratch.prepared.axes[lane], shear: scratch.prepared.shears.get(lane), t_min, t_max };
         let Some(hits) = lanes.intersect(block, &ray) else { return false };
         for i in set_bits(hits.mask) {
             let ItemKind::Prim(shape, prim) = block.items[i].kind() else { continue };
@@ -296,8 +301,8 @@ impl<A: Answers> Tracer<'_, '_, '_, A> {
     #[inline(never)]
     fn test_items<const ANY: bool>(&mut self, range: std::ops::Range<usize>, lane: usize) -> bool {
         let ray = Ray { t_max: self.scratch.t_max[lane], ..self.batch.rays.get(lane) };
-        let counter = &mut NotCounted;
-        let mut query = Query::<_, _, ANY>::new(self.batch.accel, &ray, counter);
+        let (counter, key) = (&mut NotCounted, self.scratch.keys[lane]);
+        let mut query = Query::<_, _, ANY>::prepared(self.batch.accel, ray, self.triangle_ray(lane), key, counter);
         query.best = self.answers.get(lane);
         let is_answered = self.wide.items[range].iter().any(|&item| query.test(item));
         self.answers.set(lane, query.best);

@@ -62,15 +62,19 @@ impl<'a, T: Tree, C: Counter, const ANY: bool> Query<'a, T, C, ANY> {
     #[inline(always)]
     pub fn new(accel: &'a TwoLevel<'a, T>, ray: &Ray, counter: &'a mut C) -> Self {
         let key = accel.geometry().cutouts.key(ray);
-        Self {
-            ray: *ray,
-            triangle_ray: TriangleRay::from(ray),
-            best: None,
-            counter,
-            instance: Hit::NO_INSTANCE,
-            key,
-            accel,
-        }
+        Self::prepared(accel, *ray, TriangleRay::from(ray), key, counter)
+    }
+
+    /// [`new`](Self::new) with what is known of the ray, and its key for cut-outs.
+    #[inline(always)]
+    pub fn prepared(
+        accel: &'a TwoLevel<'a, T>,
+        ray: Ray,
+        triangle_ray: TriangleRay,
+        key: u32,
+        counter: &'a mut C,
+    ) -> Self {
+        Self { ray, triangle_ray, best: None, counter, instance: Hit::NO_INSTANCE, key, accel }
     }
 
     /// Largest of the distances that still matter, inclusive.

@@ -182,7 +182,7 @@ fn evaluate_textured(context: &Context, vertices: &mut Vertices) {
         let Some(Material::Textured(textured, _)) = scene.materials.get(id as usize) else { continue };
         if let Some(checker) = textured.lambert_checker(&scene.textures) {
             let Vertices { rows, bsdfs, count, .. } = &mut *vertices;
-            vectorize!(set_checkerboard(&checker, id, &mut bsdfs.ids, rows, *count));
+            vectorize!(set_checkerboard(checker, id, &mut bsdfs.ids, rows, *count));
             continue;
         }
         let (uv, area) = (vertices.rows.uv.get(lane), vertices.rows.texture_area[lane]);
@@ -205,7 +205,7 @@ fn evaluate_textured(context: &Context, vertices: &mut Vertices) {
 
 /// Sets the albedos of the vertices whose material has this id.
 #[inline(always)]
-fn set_checkerboard(checker: &Checker, id: u32, ids: &mut Row<u32>, rows: &mut VertexRows, count: usize) {
+fn set_checkerboard(checker: Checker, id: u32, ids: &mut Row<u32>, rows: &mut VertexRows, count: usize) {
     for i in 0..whole_vectors(count) {
         let is_on_it = ids[i] == id;
         let (color, albedo) = (checker.color(rows.uv.get(i)).to_array(), rows.albedo.get(i).to_array());

@@ -3,7 +3,6 @@ use std::f64::consts::{FRAC_PI_3, PI, TAU};
 use super::tests::{assert_power_flows_out, assert_samples_are_hits, irradiance, queued_words, words};
 use super::*;
 use crate::geometry::{Disk, Frustum, Quad, Sphere};
-use crate::id::LightId;
 use crate::light::queue::{LightSampleOutput, SampleGroup};
 use crate::light::{Light, LightContext, LightQueries, LightSampleContext, LightSampleRows, LightSet, MisCompensation};
 use crate::math::rows::{BATCH, DVec3Rows, Vec3Rows};
