@@ -255,7 +255,6 @@ impl PathIntegrator {
             }
             let mut survivors = 0;
             for block in 0..wave.blocks() {
-                wave.prefetch(block + 1);
                 vertices::find(context, wave, block);
                 miss::add(context, wave, block, out);
                 materials::evaluate(context, wave, block);

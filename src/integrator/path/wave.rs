@@ -24,7 +24,6 @@ use crate::integrator::subsurface::Walk;
 use crate::integrator::{CameraBatch, CameraBlock, RayCounts};
 use crate::light::{LightQueue, LightSampleContext};
 use crate::math::compact::Compaction;
-use crate::math::prefetch::prefetch;
 use crate::math::rows::{BATCH, Row, soa};
 use crate::math::{DVec3, Ray, RayCone, RayRows, Vec3};
 use crate::sampling::{PixelSeed, SampleIdRows};
@@ -227,16 +226,6 @@ impl Wave {
     /// Paths in a block.
     pub fn block_len(&self, block: usize) -> usize {
         (self.count - block * BATCH).min(BATCH)
-    }
-
-    /// Starts to load what is known of the paths of a block.
-    #[inline]
-    pub fn prefetch(&self, block: usize) {
-        if block < self.blocks() {
-            prefetch(&self.hits, block);
-            prefetch(&self.rays, block);
-            prefetch(&self.paths, block);
-        }
     }
 
     /// Draws the random numbers of the vertices of a block, but for those of lights.
