@@ -136,8 +136,8 @@ fn find_nearer(on_shapes: &HitRows, on_others: &HitRows, nearer: &mut NearerRows
 /// Replaces hits by those that are nearer.
 #[inline(always)]
 fn take_nearer(from: &HitRows, is_nearer: &Row<u32>, hits: &mut HitRows, count: usize) {
-    for i in 0..whole_vectors(count) {
-        let is_taken = is_nearer[i] != 0;
+    for (i, &is_nearer) in is_nearer[..whole_vectors(count)].iter().enumerate() {
+        let is_taken = is_nearer != 0;
         let choose = |a: f32, b: f32| if is_taken { a } else { b };
         (hits.t[i], hits.u[i], hits.v[i]) =
             (choose(from.t[i], hits.t[i]), choose(from.u[i], hits.u[i]), choose(from.v[i], hits.v[i]));

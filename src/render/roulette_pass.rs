@@ -177,8 +177,8 @@ impl PixelScales {
 #[inline(always)]
 fn find_cells(size: [u32; 2], cells_per_pixel: Vec2, pixels: &[Row<u32>; 2], cells: &mut CellRows, count: usize) {
     let [last_x, last_y] = size.map(|count| (count - 1) as f32);
-    for i in 0..whole_vectors(count) {
-        let [x, y] = [pixels[0][i], pixels[1][i]];
+    let [columns, rows] = pixels;
+    for (i, (&x, &y)) in columns.iter().zip(rows).enumerate().take(whole_vectors(count)) {
         // Beyond the left and the upper edge of the view coordinates wrap.
         let x = ((x as i32 as f32 + 0.5) * cells_per_pixel.x - 0.5).clamp(0.0, last_x);
         let y = ((y as i32 as f32 + 0.5) * cells_per_pixel.y - 0.5).clamp(0.0, last_y);

@@ -206,12 +206,12 @@ fn evaluate_textured(context: &Context, vertices: &mut Vertices) {
 /// Sets the albedos of the vertices whose material has this id.
 #[inline(always)]
 fn set_checkerboard(checker: Checker, id: u32, ids: &mut Row<u32>, rows: &mut VertexRows, count: usize) {
-    for i in 0..whole_vectors(count) {
-        let is_on_it = ids[i] == id;
+    for (i, own_id) in ids[..whole_vectors(count)].iter_mut().enumerate() {
+        let is_on_it = *own_id == id;
         let (color, albedo) = (checker.color(rows.uv.get(i)).to_array(), rows.albedo.get(i).to_array());
         let channel = |k: usize| if is_on_it { color[k] } else { albedo[k] };
         rows.albedo.set(i, Rgb::new(channel(0), channel(1), channel(2)));
-        ids[i] = if is_on_it { DIFFUSE } else { ids[i] };
+        *own_id = if is_on_it { DIFFUSE } else { *own_id };
     }
 }
 
