@@ -21,7 +21,7 @@ pub struct Compaction {
     /// How many of the masks may have bits: blocks are often nearly empty after many bounces.
     used: usize,
     count: usize,
-    /// The chosen lanes, if there are no more.
+    /// The chosen lanes in ascending order, if they are moved one by one.
     first: [u8; LISTED],
     instructions: Instructions,
 }
