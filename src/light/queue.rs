@@ -1,6 +1,6 @@
 //! Light samples for many vertices at once, the same as for each of them alone.
 
-use super::area::{AreaQueue, EmitterQueue};
+use super::area::{AreaQueue, EmitterScratch};
 use super::environment::{EnvironmentScratch, InfiniteLightSampleRows};
 use super::set::LightChoiceRows;
 use super::tree::LightTreeScratch;
@@ -147,8 +147,8 @@ pub struct LightQueue {
     tree_scratch: LightTreeScratch,
     lanes: GroupedLanes,
     area: AreaQueue,
-    emitters: EmitterQueue,
-    sky: SkyQueue,
+    emitters: EmitterScratch,
+    sky: SkyScratch,
 }
 
 impl Default for LightQueue {
@@ -158,8 +158,8 @@ impl Default for LightQueue {
             tree_scratch: LightTreeScratch::default(),
             lanes: GroupedLanes { lanes: [[0; BATCH]; GROUPS], counts: [0; GROUPS] },
             area: AreaQueue::default(),
-            emitters: EmitterQueue::default(),
-            sky: SkyQueue::default(),
+            emitters: EmitterScratch::default(),
+            sky: SkyScratch::default(),
         }
     }
 }
@@ -263,14 +263,14 @@ impl LightQueue {
     }
 }
 
-/// Samples an image around the scene.
-struct SkyQueue {
+/// Buffers for vertices that sample the image around the scene.
+struct SkyScratch {
     u: [[f32; 2]; BATCH],
     scratch: EnvironmentScratch,
     samples: InfiniteLightSampleRows,
 }
 
-impl Default for SkyQueue {
+impl Default for SkyScratch {
     fn default() -> Self {
         Self {
             u: [[0.0; 2]; BATCH],
@@ -280,7 +280,7 @@ impl Default for SkyQueue {
     }
 }
 
-impl SkyQueue {
+impl SkyScratch {
     fn sample(
         &mut self,
         lanes: &[u8],

@@ -134,8 +134,8 @@ fn find_radiance(context: &Context, wave: &mut Wave, block: usize, lanes: &Compa
         let densities = LightDensities { pmf, samples: context.last_light_samples() as f32 };
         vectorize!(weigh(context.config.strategy, densities, evals, rows, count));
         if moments.needs_emission || !caustics.is_empty() || !connections.is_empty() {
-            let shone_on = |k: usize| !evals.radiance.get(k).is_black();
-            for (k, path) in lanes.lanes().map(|i| block * BATCH + i).enumerate().filter(|&(k, _)| shone_on(k)) {
+            let has_radiance = |k: usize| !evals.radiance.get(k).is_black();
+            for (k, path) in lanes.lanes().map(|i| block * BATCH + i).enumerate().filter(|&(k, _)| has_radiance(k)) {
                 let (direction, from) = (rows.direction.get(k), paths.from(path % BATCH).p.as_vec3());
                 let connection = connections.get(path).map(|state| state.of_miss(context, id, from, direction));
                 let weighed = |weight: f32| connection.map_or(weight, |connection| against(weight, connection));

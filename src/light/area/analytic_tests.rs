@@ -137,7 +137,7 @@ fn emitters_sampled_together_have_the_bits_of_those_sampled_alone() {
         .filter(|light| matches!(light.form, EmitterShape::Sphere(_) | EmitterShape::TransformedShape { .. }))
         .collect();
     let mut random = Rng::new(31);
-    let mut queue = EmitterQueue::default();
+    let mut queue = EmitterScratch::default();
     let set = LightSet::new(lights.iter().cloned().map(Light::Area).collect(), &geometry);
     let context = LightContext { geometry: &geometry, textures: &[], lights: &set, compensation: MisCompensation::Off };
     let (mut points, mut ids) = (DVec3Rows::ZERO, [0; BATCH]);

@@ -30,8 +30,8 @@ soa! {
     }
 }
 
-/// Vertices that sample spheres and other analytic shapes, at most [`BATCH`].
-pub(in crate::light) struct EmitterQueue {
+/// Buffers for vertices that sample spheres and other analytic shapes, at most [`BATCH`].
+pub(in crate::light) struct EmitterScratch {
     /// The spheres of the vertices that sample any.
     spheres: SphereRows,
     rows: EmitterRows,
@@ -47,7 +47,7 @@ struct EmitterRows {
     samples: LightSampleRows,
 }
 
-impl Default for EmitterQueue {
+impl Default for EmitterScratch {
     fn default() -> Self {
         let rows = EmitterRows {
             u: [[0.0; BATCH]; 2],
@@ -63,7 +63,7 @@ impl Default for EmitterQueue {
 /// Vertices with one light that are worth a vector.
 const MIN_LANES: usize = 3;
 
-impl EmitterQueue {
+impl EmitterScratch {
     /// Samples the lights of vertices whose lights are all spheres.
     pub fn sample_spheres(
         &mut self,

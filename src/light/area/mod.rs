@@ -11,7 +11,7 @@ mod triangle;
 use std::f64::consts::PI;
 
 pub use emission::EmittedRay;
-pub(super) use emitters::EmitterQueue;
+pub(super) use emitters::EmitterScratch;
 use parallelogram::ParallelogramEmitter;
 pub(super) use queue::AreaQueue;
 use sphere::SphereEmitter;
