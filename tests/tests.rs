@@ -81,6 +81,8 @@ mod heterogeneous_media;
 mod hygiene;
 /// What shapes, materials and instances are called in layers that pick them.
 mod identities;
+/// What instances place, seen and hit.
+mod instances;
 /// Renders by the program that are killed or answer signals.
 mod interrupted;
 /// The parts of the light, motion, and what denoisers need.

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use super::{Detail, Hit, Shape, SurfaceInteraction};
 use crate::id::{ObjectId, ShapeId};
 use crate::math::float::{EMBREE_LARGE, UNIT_ROUNDOFF};
-use crate::math::{Aabb, Bounds, DMat3, Motion, Ray, Transform, Vec3};
+use crate::math::{Aabb, Bounds, DMat3, DVec3, Motion, Ray, Transform, Vec3};
 
 /// A group of shapes in a space of its own.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -21,6 +21,16 @@ pub struct InverseReach {
     pub reach: f32,
     /// Largest magnitude of a component of the translation.
     pub offset: f32,
+}
+
+/// A point of a surface with its normals.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PointWithNormals {
+    pub p: DVec3,
+    /// As [`SurfaceInteraction::error`].
+    pub error: f32,
+    pub n_g: Vec3,
+    pub n_s: Vec3,
 }
 
 /// One placement of an object in the world.
@@ -122,6 +132,20 @@ impl Instance {
         let local_ray = self.object_ray(ray);
         let local = shape.interaction(detail, &local_ray, hit)?;
         let t = &*self.transform_at(ray.time);
+        let point = PointWithNormals { p: local.p, error: local.error, n_g: local.n_g, n_s: local.n_s };
+        let PointWithNormals { p, error, n_g, n_s } = Self::placed(t, &point);
+        let dp_du = finite_or_zero(t.vector(local.dp_du.as_dvec3()).as_vec3());
+        Some(SurfaceInteraction { p, error, n_g, n_s, dp_du, instance: hit.instance, ..local })
+    }
+
+    /// A point of the object where the instance stands at a time from 0 to 1.
+    #[inline]
+    pub(crate) fn point_at(&self, local: &PointWithNormals, time: f32) -> PointWithNormals {
+        Self::placed(&self.transform_at(time), local)
+    }
+
+    #[inline(always)]
+    fn placed(t: &Transform, local: &PointWithNormals) -> PointWithNormals {
         let n_local = local.n_g.as_dvec3();
         let n_world = t.normal(n_local);
         let n_g = n_world.normalize().as_vec3();
@@ -142,15 +166,7 @@ impl Instance {
             + f64::from(local.error) * stretch
             + UNIT_ROUNDOFF * n_local.abs().dot(local.p.abs()) * stretch;
 
-        Some(SurfaceInteraction {
-            p,
-            error: error as f32,
-            n_g,
-            n_s: if n_s.dot(n_g) < 0.0 { -n_s } else { n_s },
-            dp_du: finite_or_zero(t.vector(local.dp_du.as_dvec3()).as_vec3()),
-            instance: hit.instance,
-            ..local
-        })
+        PointWithNormals { p, error: error as f32, n_g, n_s: if n_s.dot(n_g) < 0.0 { -n_s } else { n_s } }
     }
 }
 

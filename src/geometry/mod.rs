@@ -33,6 +33,7 @@ pub use cutout::{AlphaMask, AlphaMasks};
 pub use disk::Disk;
 pub use frustum::Frustum;
 pub use hit::Hit;
+pub(crate) use instance::PointWithNormals;
 pub use instance::{Instance, InverseReach, Object};
 pub use interaction::{Detail, SpawnPoint, SurfaceInteraction};
 pub(crate) use mesh::interpolated_normal;

@@ -2,7 +2,8 @@
 //!
 //! Rays are prepared in rows. Then up to [`SLOTS`] are traversed at once: a round opens a node for each ray that is
 //! at one, and tests a leaf for each ray that is at one, so that few branches depend on single rays; what a ray needs
-//! in the next round is prefetched. Answers are those of single rays, bit for bit.
+//! in the next round is prefetched. A ray that meets an instance goes on in the object's hierarchy, and on its stack is
+//! the way out. Answers are those of single rays, bit for bit.
 
 use std::cell::RefCell;
 use std::hint::select_unpredictable;
@@ -11,14 +12,15 @@ use super::Bvh;
 use super::any_hit_order::{AnyHitOrder, MeasuredOrders};
 use super::lanes::{SimdIsa, WideRay};
 use super::wide::{Block, Child, ChildKind, Entry, STACK, WIDTH, Wide, WideNode};
-use crate::accel::inspect::ItemKind;
+use crate::accel::inspect::{Item, ItemKind};
 use crate::accel::tree::{Answers, NotCounted, Query, SlabRay, SlabRows, TwoLevel, t_max_after};
 use crate::geometry::{Hit, Shear, ShearRows, TriangleHit, TriangleRay, largest_axis};
+use crate::id::InstanceId;
 use crate::math::compact::set_bits;
 use crate::math::prefetch::{address, prefetch_lines};
 use crate::math::rows::{BATCH, Row, WIDTH as ROW_WIDTH, whole_vectors};
 use crate::math::vectorize::vectorize;
-use crate::math::{Ray, RayRows};
+use crate::math::{Aabb, Ray, RayRows};
 
 /// Rays that are traversed at once: a bit each.
 const SLOTS: usize = 32;
@@ -33,7 +35,7 @@ pub(super) struct Batch<'r, 'a> {
     pub count: usize,
 }
 
-/// What is found of all rays before they are traced.
+/// What is found of rays before they are traced.
 struct PreparedRows {
     slabs: SlabRows,
     shears: ShearRows,
@@ -44,6 +46,9 @@ struct PreparedRows {
 /// What one thread needs to trace batches.
 pub(super) struct Scratch {
     prepared: PreparedRows,
+    /// Of rays in instances, in their spaces.
+    in_object: PreparedRows,
+    object_rays: RayRows,
     t_max: Row,
     keys: Row<u32>,
     /// The node or leaf that each ray visits next.
@@ -64,16 +69,13 @@ pub(super) fn with_scratch(trace: impl FnOnce(&mut Scratch)) {
 impl Default for Scratch {
     fn default() -> Self {
         Self {
-            prepared: PreparedRows {
-                slabs: SlabRows::default(),
-                shears: ShearRows::default(),
-                axes: [0; BATCH],
-                is_valid: [0; BATCH],
-            },
+            prepared: PreparedRows::default(),
+            in_object: PreparedRows::default(),
+            object_rays: RayRows::default(),
             t_max: [0.0; BATCH],
             keys: [0; BATCH],
             next: [Child::ROOT; BATCH],
-            stacks: [Stack { entries: [Entry::NONE; STACK + WIDTH], len: 0 }; SLOTS],
+            stacks: [Stack { entries: [Entry::NONE; MAX_ENTRIES], len: 0 }; SLOTS],
             any_hit_orders: MeasuredOrders::default(),
         }
     }
@@ -95,6 +97,12 @@ impl Scratch {
     }
 }
 
+impl Default for PreparedRows {
+    fn default() -> Self {
+        Self { slabs: SlabRows::default(), shears: ShearRows::default(), axes: [0; BATCH], is_valid: [0; BATCH] }
+    }
+}
+
 impl PreparedRows {
     #[inline(always)]
     fn set(&mut self, wide: &Wide, batch: &Batch<'_, '_>, count: usize) {
@@ -112,13 +120,24 @@ impl PreparedRows {
             self.shears.set(lane, &Shear::new(origin, direction, self.axes[lane]));
         }
     }
+
+    /// Sets one ray, for boxes within `bounds`.
+    #[inline(always)]
+    fn set_one(&mut self, lane: usize, ray: &Ray, bounds: &Aabb) {
+        self.slabs.set(lane, &SlabRay::new(ray, bounds, 0.0));
+        self.axes[lane] = largest_axis(ray.direction);
+        self.shears.set(lane, &Shear::new(ray.origin, ray.direction, self.axes[lane]));
+    }
 }
+
+/// The most entries that wait: those of the world, those of an object, the way out, and what is stored beyond the top.
+const MAX_ENTRIES: usize = 2 * STACK + 2 * WIDTH;
 
 /// Children that wait. Not a power of two long: else the tops of all stacks were in the same few sets of the cache.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 struct Stack {
-    entries: [Entry; STACK + WIDTH],
+    entries: [Entry; MAX_ENTRIES],
     len: usize,
 }
 
@@ -129,6 +148,13 @@ impl Stack {
         // There is room: `Bvh::wide` bounds the depth.
         self.entries[self.len..self.len + WIDTH].copy_from_slice(&entries);
         self.len += count as usize;
+    }
+
+    /// Adds the way out of an instance, which is taken wherever the closest hit is.
+    #[inline(always)]
+    fn push_leave(&mut self) {
+        self.entries[self.len] = Entry::new(f32::NEG_INFINITY, Child::LEAVE);
+        self.len += 1;
     }
 
     /// Takes entries from the top, up to one that is entered before `t_max`.
@@ -152,12 +178,19 @@ struct Places {
     leaves: u32,
 }
 
-/// The closest hits of rays, or `ANY` hits.
+/// The hierarchy that a ray is in: that of the world, or of an object.
+#[derive(Clone, Copy)]
+struct Space<'r> {
+    wide: &'r Wide,
+    instance: InstanceId,
+}
+
+/// The closest hits of rays, or `ANY` hits, in a scene with or without `INSTANCES`.
 #[inline(always)]
-pub(super) fn trace<L: SimdIsa, const ANY: bool>(
+pub(super) fn trace<'r, L: SimdIsa, const ANY: bool, const INSTANCES: bool>(
     lanes: L,
-    wide: &Wide,
-    batch: &Batch<'_, '_>,
+    wide: &'r Wide,
+    batch: &Batch<'r, '_>,
     scratch: &mut Scratch,
     answers: &mut impl Answers,
 ) {
@@ -167,8 +200,17 @@ pub(super) fn trace<L: SimdIsa, const ANY: bool>(
         answers.set(lane, None);
     }
     let any_hit_order = if ANY { scratch.any_hit_orders.next() } else { AnyHitOrder::Distance };
-    let mut tracer =
-        Tracer { wide, batch, scratch, answers, any_hit_order, places: Places::default(), ended: u32::MAX };
+    let world = Space { wide, instance: Hit::NO_INSTANCE };
+    let mut tracer = Tracer::<_, INSTANCES> {
+        world,
+        spaces: [world; SLOTS],
+        batch,
+        scratch,
+        answers,
+        any_hit_order,
+        places: Places::default(),
+        ended: u32::MAX,
+    };
     let mut steps = 0;
     let mut lane_of = [0; SLOTS];
     let mut rest = 0..count;
@@ -177,6 +219,9 @@ pub(super) fn trace<L: SimdIsa, const ANY: bool>(
             let Some(lane) = rest.find(|&lane| tracer.scratch.prepared.is_valid[lane] != 0) else { break };
             lane_of[slot] = lane;
             tracer.scratch.stacks[slot].len = 0;
+            if INSTANCES {
+                tracer.spaces[slot] = world;
+            }
             tracer.places.nodes |= 1 << slot;
         }
         let now = std::mem::take(&mut tracer.places);
@@ -196,8 +241,10 @@ pub(super) fn trace<L: SimdIsa, const ANY: bool>(
     }
 }
 
-struct Tracer<'t, 'r, 'a, A> {
-    wide: &'t Wide,
+struct Tracer<'t, 'r, 'a, A, const INSTANCES: bool> {
+    world: Space<'r>,
+    /// Of each slot, with `INSTANCES`.
+    spaces: [Space<'r>; SLOTS],
     batch: &'t Batch<'r, 'a>,
     scratch: &'t mut Scratch,
     answers: &'t mut A,
@@ -207,42 +254,80 @@ struct Tracer<'t, 'r, 'a, A> {
     ended: u32,
 }
 
-impl<A: Answers> Tracer<'_, '_, '_, A> {
+impl<'r, A: Answers, const INSTANCES: bool> Tracer<'_, 'r, '_, A, INSTANCES> {
+    #[inline(always)]
+    fn space(&self, slot: usize) -> Space<'r> {
+        if INSTANCES { self.spaces[slot] } else { self.world }
+    }
+
+    #[inline(always)]
+    fn is_in_object(&self, slot: usize) -> bool {
+        INSTANCES && self.spaces[slot].instance != Hit::NO_INSTANCE
+    }
+
+    /// The ray in the space it is in.
+    #[inline(always)]
+    fn ray(&self, slot: usize, lane: usize) -> Ray {
+        let rays = if self.is_in_object(slot) { &self.scratch.object_rays } else { self.batch.rays };
+        rays.get(lane)
+    }
+
+    /// What is known of the ray in the space it is in.
+    #[inline(always)]
+    fn prepared(&self, slot: usize) -> &PreparedRows {
+        if self.is_in_object(slot) { &self.scratch.in_object } else { &self.scratch.prepared }
+    }
+
     /// Opens the node that a ray is at.
     #[inline(always)]
     fn open<L: SimdIsa, const ANY: bool>(&mut self, lanes: L, slot: usize, lane: usize) {
-        let scratch = &mut *self.scratch;
-        let node = &self.wide.nodes[scratch.next[lane].node_index()];
-        let ray = WideRay::new(scratch.prepared.slabs.get(lane));
+        let wide = self.space(slot).wide;
+        let node = &wide.nodes[self.scratch.next[lane].node_index()];
+        let slabs = &self.prepared(slot).slabs;
+        let ray = WideRay::new(slabs.get(lane));
         // Not a negative zero: bits of distances are compared.
         let t_min = self.batch.rays.t_min[lane] + 0.0;
-        let (_, enter) = lanes.enter(node, &ray, t_min, scratch.t_max[lane]);
+        let (_, enter) = lanes.enter(node, &ray, t_min, self.scratch.t_max[lane]);
         let order = if ANY && self.any_hit_order == AnyHitOrder::Occlusion {
             WideNode::BY_SLOT
         } else {
-            node.orders[scratch.prepared.slabs.negative[lane] as usize % 8]
+            node.orders[slabs.negative[lane] as usize % 8]
         };
         let (entries, count) = lanes.ordered(enter, order, &node.children);
-        scratch.stacks[slot].push(entries, count);
+        self.scratch.stacks[slot].push(entries, count);
         self.advance(slot, lane);
     }
 
     /// Tests the leaf that a ray is at.
     #[inline(always)]
     fn test_leaf<L: SimdIsa, const ANY: bool>(&mut self, lanes: L, slot: usize, lane: usize) {
+        let wide = self.space(slot).wide;
         let is_answered = match self.scratch.next[lane].kind() {
             ChildKind::Blocks { first, count } => {
                 let mut is_answered = false;
-                for block in &self.wide.blocks[first as usize..(first + count) as usize] {
-                    if self.test_block::<L, ANY>(lanes, block, lane) {
+                for block in &wide.blocks[first as usize..(first + count) as usize] {
+                    if self.test_block::<L, ANY>(lanes, block, slot, lane) {
                         is_answered = true;
                         break;
                     }
                 }
                 is_answered
             }
-            ChildKind::Items { first, count } => self.test_items::<ANY>(first as usize..(first + count) as usize, lane),
-            ChildKind::Node(_) => false,
+            ChildKind::Items { first, count } => {
+                let items = &wide.items[first as usize..(first + count) as usize];
+                if INSTANCES
+                    && let [item] = items
+                    && let ItemKind::Instance(id) = item.kind()
+                {
+                    if self.enter(id, slot, lane) {
+                        return;
+                    }
+                    false
+                } else {
+                    self.test_items::<ANY>(items, slot, lane)
+                }
+            }
+            ChildKind::Node(_) | ChildKind::Leave => false,
         };
         if is_answered {
             self.ended |= 1 << slot;
@@ -251,44 +336,74 @@ impl<A: Answers> Tracer<'_, '_, '_, A> {
         }
     }
 
+    /// Goes on to the first node of the hierarchy of an instance. False if no ray gets there.
+    #[inline(never)]
+    fn enter(&mut self, id: InstanceId, slot: usize, lane: usize) -> bool {
+        let accel = self.batch.accel;
+        let instance = accel.geometry().instance(id);
+        let Some(wide) = accel.object(instance.object).as_wide() else { return false };
+        let scratch = &mut *self.scratch;
+        let ray = instance.object_ray(&Ray { t_max: scratch.t_max[lane], ..self.batch.rays.get(lane) });
+        // A ray may leave the range of f32 on its way into a small object.
+        if !ray.is_valid() {
+            return false;
+        }
+        scratch.in_object.set_one(lane, &ray, &wide.bounds);
+        scratch.object_rays.set(lane, &ray);
+        scratch.stacks[slot].push_leave();
+        scratch.next[lane] = Child::ROOT;
+        self.spaces[slot] = Space { wide, instance: id };
+        self.places.nodes |= 1 << slot;
+        prefetch_lines(address(&wide.nodes, 0), PREFETCHED_LINES);
+        true
+    }
+
     /// Goes on to what is on top of the stack.
     #[inline(always)]
     fn advance(&mut self, slot: usize, lane: usize) {
-        let Some(child) = self.scratch.stacks[slot].pop(self.scratch.t_max[lane]) else {
-            self.ended |= 1 << slot;
-            return;
+        let child = loop {
+            let Some(child) = self.scratch.stacks[slot].pop(self.scratch.t_max[lane]) else {
+                self.ended |= 1 << slot;
+                return;
+            };
+            if !INSTANCES || child != Child::LEAVE {
+                break child;
+            }
+            self.spaces[slot] = self.world;
         };
         self.scratch.next[lane] = child;
         let is_node = child.is_node();
         self.places.nodes |= u32::from(is_node) << slot;
         self.places.leaves |= u32::from(!is_node) << slot;
         // Without a branch, which would be wrong half of the time. Of other items, an address that is not used.
-        let (node, block) = (address(&self.wide.nodes, child.node_index()), address(&self.wide.blocks, child.first()));
+        let wide = self.space(slot).wide;
+        let (node, block) = (address(&wide.nodes, child.node_index()), address(&wide.blocks, child.first()));
         prefetch_lines(select_unpredictable(is_node, node, block), PREFETCHED_LINES);
     }
 
     #[inline(always)]
-    fn triangle_ray(&self, lane: usize) -> TriangleRay {
-        let Scratch { prepared, t_max, .. } = &*self.scratch;
-        let (t_min, t_max) = (self.batch.rays.t_min[lane].into(), t_max[lane].into());
+    fn triangle_ray(&self, slot: usize, lane: usize) -> TriangleRay {
+        let prepared = self.prepared(slot);
+        let (t_min, t_max) = (self.batch.rays.t_min[lane].into(), self.scratch.t_max[lane].into());
         TriangleRay { kz: prepared.axes[lane], shear: prepared.shears.get(lane), t_min, t_max }
     }
 
     /// Tests up to four triangles. True if the ray is answered.
     #[inline(always)]
-    fn test_block<L: SimdIsa, const ANY: bool>(&mut self, lanes: L, block: &Block, lane: usize) -> bool {
-        let ray = self.triangle_ray(lane);
-        let scratch = &mut *self.scratch;
-        let (rays, geometry) = (self.batch.rays, self.batch.accel.geometry());
+    fn test_block<L: SimdIsa, const ANY: bool>(&mut self, lanes: L, block: &Block, slot: usize, lane: usize) -> bool {
+        let ray = self.triangle_ray(slot, lane);
+        let geometry = self.batch.accel.geometry();
+        let instance = self.space(slot).instance;
         let Some(hits) = lanes.intersect(block, &ray) else { return false };
         for i in set_bits(hits.mask) {
             let ItemKind::Prim(shape, prim) = block.items[i].kind() else { continue };
             let TriangleHit { t, u, v } = hits.get(i);
-            let hit = Hit { t, u, v, shape, prim, instance: Hit::NO_INSTANCE };
+            let hit = Hit { t, u, v, shape, prim, instance };
             let is_better = ANY || self.answers.get(lane).is_none_or(|best| hit.is_before(&best));
-            if is_better && geometry.cutouts.counts(&geometry.shapes, scratch.keys[lane], &rays.get(lane), &hit) {
+            let key = self.scratch.keys[lane];
+            if is_better && geometry.cutouts.counts(&geometry.shapes, key, &self.ray(slot, lane), &hit) {
                 self.answers.set(lane, Some(hit));
-                scratch.t_max[lane] = t_max_after(&hit, scratch.t_max[lane]);
+                self.scratch.t_max[lane] = t_max_after(&hit, self.scratch.t_max[lane]);
                 if ANY {
                     return true;
                 }
@@ -299,12 +414,14 @@ impl<A: Answers> Tracer<'_, '_, '_, A> {
 
     /// Tests items other than triangles. True if the ray is answered.
     #[inline(never)]
-    fn test_items<const ANY: bool>(&mut self, range: std::ops::Range<usize>, lane: usize) -> bool {
-        let ray = Ray { t_max: self.scratch.t_max[lane], ..self.batch.rays.get(lane) };
+    fn test_items<const ANY: bool>(&mut self, items: &[Item], slot: usize, lane: usize) -> bool {
+        let ray = Ray { t_max: self.scratch.t_max[lane], ..self.ray(slot, lane) };
         let (counter, key) = (&mut NotCounted, self.scratch.keys[lane]);
-        let mut query = Query::<_, _, ANY>::prepared(self.batch.accel, ray, self.triangle_ray(lane), key, counter);
+        let mut query =
+            Query::<_, _, ANY>::prepared(self.batch.accel, ray, self.triangle_ray(slot, lane), key, counter);
+        query.instance = self.space(slot).instance;
         query.best = self.answers.get(lane);
-        let is_answered = self.wide.items[range].iter().any(|&item| query.test(item));
+        let is_answered = items.iter().any(|&item| query.test(item));
         self.answers.set(lane, query.best);
         self.scratch.t_max[lane] = query.t_max();
         is_answered

@@ -67,7 +67,11 @@ impl<A: Answers, const ANY: bool> pulp::NullaryFnOnce for BatchRun<'_, '_, A, AN
 
     #[inline(always)]
     fn call(self) {
-        batch::trace::<_, ANY>(self.simd, self.wide, &self.batch, self.scratch, self.answers);
+        if self.batch.accel.geometry().instances.is_empty() {
+            batch::trace::<_, ANY, false>(self.simd, self.wide, &self.batch, self.scratch, self.answers);
+        } else {
+            batch::trace::<_, ANY, true>(self.simd, self.wide, &self.batch, self.scratch, self.answers);
+        }
     }
 }
 
@@ -75,6 +79,13 @@ impl Bvh {
     /// Whether the machine has the instructions that batches of rays are traced with.
     pub fn is_vectorized() -> bool {
         V3::try_new().is_some()
+    }
+
+    fn as_wide(&self) -> Option<&Wide> {
+        match &self.0 {
+            Layout::Wide(wide, _) => Some(wide),
+            Layout::Empty | Layout::Binary(_) => None,
+        }
     }
 
     /// The wide form over at least one item, traced with or without SIMD.
@@ -150,6 +161,10 @@ impl Tree for Bvh {
         }
     }
 
+    fn cover(&self) -> Vec<Aabb> {
+        self.as_wide().map_or_else(|| vec![self.bounds()], Wide::cover)
+    }
+
     fn memory_bytes(&self) -> usize {
         match &self.0 {
             Layout::Empty => 0,
@@ -196,6 +211,7 @@ fn visit_wide(wide: &Wide, visit: &mut dyn FnMut(&NodeInfo)) {
                 ChildKind::Items { first, count } => {
                     items.extend_from_slice(&wide.items[first as usize..(first + count) as usize]);
                 }
+                ChildKind::Leave => {}
             }
             visit(&NodeInfo { bounds, depth: depth + 1, children: 0, items: &items });
         }

@@ -87,7 +87,7 @@ fn leaf<L: SimdIsa, C: Counter, const ANY: bool>(
         ChildKind::Items { first, count } => {
             wide.items[first as usize..(first + count) as usize].iter().any(|&item| query.test(item))
         }
-        ChildKind::Node(_) => false,
+        ChildKind::Node(_) | ChildKind::Leave => false,
     }
 }
 
@@ -105,7 +105,7 @@ fn test_block<L: SimdIsa, C: Counter, const ANY: bool>(
         mask &= mask - 1;
         let ItemKind::Prim(shape, prim) = block.items[lane].kind() else { continue };
         let TriangleHit { t, u, v } = hits.get(lane);
-        if query.offer(Hit { t, u, v, shape, prim, instance: query.instance() }) {
+        if query.offer(Hit { t, u, v, shape, prim, instance: query.instance }) {
             return true;
         }
     }

@@ -12,7 +12,8 @@ pub(super) const WIDTH: usize = 8;
 /// The most entries that wait on the stack: seven a level.
 pub(super) const STACK: usize = 256;
 
-/// A reference to a child: an inner node, a run of triangle blocks, or a run of other items.
+/// A reference to a child: an inner node, a run of triangle blocks, or a run of other items; on the stack of a ray also
+/// the way out of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Child(u32);
 
@@ -22,6 +23,7 @@ pub(super) enum ChildKind {
     Node(u32),
     Blocks { first: u32, count: u32 },
     Items { first: u32, count: u32 },
+    Leave,
 }
 
 impl Child {
@@ -31,6 +33,8 @@ impl Child {
     pub const ROOT: Self = Self(0);
     /// Behind an empty box, never opened.
     pub const NONE: Self = Self(u32::MAX);
+    /// Where a ray leaves an instance.
+    pub const LEAVE: Self = Self(3 << 30);
 
     fn node(index: usize) -> Self {
         Self(index as u32)
@@ -76,7 +80,8 @@ impl Child {
         match self.0 >> 30 {
             0 => ChildKind::Node(self.0),
             1 => ChildKind::Blocks { first, count },
-            _ => ChildKind::Items { first, count },
+            2 => ChildKind::Items { first, count },
+            _ => ChildKind::Leave,
         }
     }
 }
@@ -229,6 +234,20 @@ impl Wide {
             self.blocks.push(block);
         }
         Child::run(1, first, self.blocks.len() - first)
+    }
+
+    /// The boxes of the root's grandchildren, and of leaves above them.
+    pub fn cover(&self) -> Vec<Aabb> {
+        let children = |node: usize| (0..WIDTH).filter_map(move |slot| self.nodes[node].get(slot));
+        let mut cover = Vec::with_capacity(WIDTH * WIDTH);
+        for (bounds, child) in children(0) {
+            if child.is_node() {
+                cover.extend(children(child.node_index()).map(|(bounds, _)| bounds));
+            } else {
+                cover.push(bounds);
+            }
+        }
+        cover
     }
 
     /// Bytes held.

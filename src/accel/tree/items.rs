@@ -29,12 +29,13 @@ impl<'g> Items<'g> {
         Self { geometry, list, bounds }
     }
 
-    /// These shapes of the world, and instances of objects whose bounds are given. Instances of empty objects are left
-    /// out.
-    pub fn of_world(geometry: &'g Geometry, shapes: &[ShapeId], objects: &[Aabb]) -> Self {
+    /// These shapes of the world, and instances of objects, of each of which boxes are given that hold it. Instances of
+    /// empty objects are left out.
+    pub fn of_world(geometry: &'g Geometry, shapes: &[ShapeId], objects: &[Vec<Aabb>]) -> Self {
         let mut items = Self::of_shapes(geometry, shapes);
         for (i, instance) in geometry.instances.iter().enumerate() {
-            let bounds = instance.bounds(&objects[instance.object.index()]);
+            let boxes = &objects[instance.object.index()];
+            let bounds = boxes.iter().fold(Aabb::EMPTY, |all, part| all.union(&instance.bounds(part)));
             if !bounds.is_empty() {
                 items.list.push(Item::instance(InstanceId::new(i)));
                 items.bounds.push(bounds);

@@ -80,6 +80,11 @@ pub(super) trait Tree: Send + Sync + Sized {
     /// Bounds of all items; empty if there is none.
     fn bounds(&self) -> Aabb;
 
+    /// A few boxes that together hold all items, so that those around instances, which are turned, are small.
+    fn cover(&self) -> Vec<Aabb> {
+        vec![self.bounds()]
+    }
+
     /// Bytes the tree holds.
     fn memory_bytes(&self) -> usize;
 

@@ -44,7 +44,8 @@ pub(in crate::accel) struct Query<'a, T, C, const ANY: bool> {
     pub best: Option<Hit>,
     /// Counts the work.
     pub counter: &'a mut C,
-    instance: InstanceId,
+    /// The space this query is in: what a [`Hit`] found here names as its instance.
+    pub instance: InstanceId,
     /// Of the world-space ray, for cut-outs.
     key: u32,
     accel: &'a TwoLevel<'a, T>,
@@ -111,12 +112,6 @@ impl<'a, T: Tree, C: Counter, const ANY: bool> Query<'a, T, C, ANY> {
             }
             ItemKind::Instance(id) => self.enter(id),
         }
-    }
-
-    /// The space this query is in: what a [`Hit`] found here names as its instance.
-    #[inline(always)]
-    pub fn instance(&self) -> InstanceId {
-        self.instance
     }
 
     /// Takes a hit of a triangle within the ray's interval, if it counts and is better than the best. True ends the

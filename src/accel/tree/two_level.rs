@@ -32,7 +32,7 @@ impl<'g, T: Tree> TwoLevel<'g, T> {
                 .iter()
                 .map(|object| T::build(&Items::of_shapes(geometry, &object.shapes), options))
                 .collect();
-            let bounds: Vec<Aabb> = objects.iter().map(T::bounds).collect();
+            let bounds: Vec<Vec<Aabb>> = objects.iter().map(T::cover).collect();
             (T::build(&Items::of_world(geometry, shapes, &bounds), options), objects)
         };
         // A pool that cannot be made is no reason to fail: the current one builds the same trees.

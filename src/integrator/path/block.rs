@@ -60,7 +60,9 @@ pub(super) mod spawn {
 soa! {
     /// Triangles that rays hit.
     pub(super) struct TriangleRows {
+        /// The ray, in the space of the triangle.
         origin: Vec3,
+        direction: Vec3,
         /// Indices of the corners.
         a_index: u32,
         b_index: u32,
@@ -232,6 +234,8 @@ pub(super) struct Vertices {
     pub scatter: ScatterRows,
     /// Paths of the block that leave the scene.
     pub misses: Vec<u8>,
+    /// Vertices on triangles of instances.
+    pub instanced: Vec<u8>,
     /// Vertices on emitters.
     pub emitters: Vec<u8>,
     /// Vertices on surfaces that are not diffuse.

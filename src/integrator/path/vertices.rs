@@ -5,8 +5,10 @@ use super::block::{AnalyticScratch, PointRows, TriangleRows, VertexRows, Vertice
 use super::wave::{PathRows, Wave};
 use crate::accel::HitRows;
 use crate::color::Rgb;
-use crate::geometry::{Hit, Mesh, Shape, TrianglePoints, interpolated_normal, interpolated_uv, uv_area, uv_density};
-use crate::id::ShapeId;
+use crate::geometry::{
+    Hit, Mesh, PointWithNormals, Shape, TrianglePoints, interpolated_normal, interpolated_uv, uv_area, uv_density,
+};
+use crate::id::{InstanceId, ShapeId};
 use crate::integrator::shading::{adapted_normal, is_consistent};
 use crate::math::compact::{Compaction, collect_lanes};
 use crate::math::prefetch::{address, prefetch_lines};
@@ -32,6 +34,7 @@ pub(super) fn find(context: &Context, wave: &mut Wave, block: usize) {
             (false, true) => vectorize!(intersect_triangles::<false, true>(triangles, rows, points, *count)),
             (true, true) => vectorize!(intersect_triangles::<true, true>(triangles, rows, points, *count)),
         }
+        place_instanced(context, vertices);
     }
     if features.analytic_shapes {
         lanes.compact(&rays.t_min, &mut vertices.analytic.t_min);
@@ -142,18 +145,20 @@ const MIN_ANALYTIC_LANES: usize = 3;
 
 /// Gathers the indices of the triangles' corners; the result is the meshes, if there are any.
 fn gather_indices<'a>(context: &Context<'a>, vertices: &mut Vertices) -> Option<[Option<&'a Mesh>; BATCH]> {
-    let Vertices { count, rows, triangles, .. } = vertices;
+    let Vertices { count, rows, triangles, instanced, .. } = vertices;
     let mut meshes = [None; BATCH];
     let mut has_triangles = false;
+    instanced.clear();
     // Prefetched, so that all lanes wait for memory together.
     for (lane, mesh) in meshes.iter_mut().enumerate().take(*count) {
-        if rows.instance[lane] == Hit::NO_INSTANCE.0 {
-            *mesh = context.world.mesh_without_tangents(ShapeId(rows.shape[lane]));
-        }
+        *mesh = context.world.mesh_without_tangents(ShapeId(rows.shape[lane]));
         rows.is_unresolved[lane] = u32::from(mesh.is_none());
         if let Some(mesh) = mesh {
             has_triangles = true;
             prefetch_lines(address(mesh.triangles(), rows.prim[lane] as usize), 1);
+            if rows.instance[lane] != Hit::NO_INSTANCE.0 {
+                instanced.push(lane as u8);
+            }
         }
     }
     if !has_triangles {
@@ -165,7 +170,33 @@ fn gather_indices<'a>(context: &Context<'a>, vertices: &mut Vertices) -> Option<
                 mesh.triangles()[rows.prim[lane] as usize];
         }
     }
+    triangles.direction = rows.direction.clone();
+    for &lane in &*instanced {
+        let lane = usize::from(lane);
+        let (origin, direction) = (triangles.origin.get(lane), rows.direction.get(lane));
+        let ray = Ray { time: rows.time[lane], ..Ray::new(origin, direction) };
+        let ray = context.scene.geometry.instance(InstanceId(rows.instance[lane])).object_ray(&ray);
+        triangles.origin.set(lane, ray.origin);
+        triangles.direction.set(lane, ray.direction);
+    }
     Some(meshes)
+}
+
+/// Places the points of instanced triangles, and their normals, in the world.
+fn place_instanced(context: &Context, vertices: &mut Vertices) {
+    let Vertices { rows, points, instanced, .. } = vertices;
+    for &lane in &*instanced {
+        let lane = usize::from(lane);
+        let instance = context.scene.geometry.instance(InstanceId(rows.instance[lane]));
+        let (p, error) = (points.p.get(lane), rows.error[lane]);
+        let local = PointWithNormals { p, error, n_g: rows.n_g.get(lane), n_s: rows.n_s.get(lane) };
+        let at = instance.point_at(&local, rows.time[lane]);
+        points.p.set(lane, at.p);
+        rows.n_g.set(lane, at.n_g);
+        rows.n_s.set(lane, at.n_s);
+        // The density of uv is that of the object.
+        (rows.error[lane], rows.uv_density[lane]) = (at.error, 0.0);
+    }
 }
 
 /// Gathers the corners of the triangles.
@@ -209,7 +240,7 @@ fn intersect_triangles<const SMOOTH: bool, const UV: bool>(
 ) {
     for i in 0..whole_vectors(count) {
         let corners = TrianglePoints { a: triangles.a.get(i), b: triangles.b.get(i), c: triangles.c.get(i) };
-        let hit = corners.intersect_plane(triangles.origin.get(i), rows.direction.get(i));
+        let hit = corners.intersect_plane(triangles.origin.get(i), triangles.direction.get(i));
         points.p.set(i, hit.p);
         rows.t[i] = hit.t as f32;
         rows.error[i] = hit.error;
