@@ -8,6 +8,7 @@ use pulp::cast;
 use pulp::x86::V4;
 
 use crate::math::float::ONE_MINUS_EPSILON;
+use crate::math::prefetch::prefetch;
 use crate::math::vectorize::vectorize;
 
 /// The whole of a cumulative table. Tables count in units of `1 / WHOLE`: the density is then exactly that of the
@@ -314,6 +315,7 @@ impl Piecewise2d {
     fn choose_blocks(&self, by: impl CountKeys, us: &[[f32; 2]], chosen: &mut [ChosenBlock]) {
         for (chosen, &u) in chosen.iter_mut().zip(us) {
             *chosen = self.choose_block(by, u);
+            prefetch(&self.blocks, self.block_at(chosen));
         }
     }
 

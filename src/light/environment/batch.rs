@@ -109,6 +109,9 @@ impl EnvironmentScratch {
     ) {
         let Self { locations, corners, .. } = self;
         vectorize!(locate(map, directions, locations, count));
+        for (&x, &y) in locations.x.iter().zip(&locations.y).take(count) {
+            map.prefetch_corners(x as usize, y as usize);
+        }
         look_up(map, locations, count, corners, &mut evals.radiance);
         let Some(compensation) = compensation else { return };
         match map.density(compensation) {
@@ -135,6 +138,7 @@ impl EnvironmentScratch {
             [cells.u[i], cells.v[i]] = cell.within;
             cells.inverse_solid_angle[i] = map.inverse_solid_angles[cell.y];
             (cells.upper_cosine[i], cells.lower_cosine[i]) = (map.cosines[cell.y], map.cosines[cell.y + 1]);
+            map.prefetch_corners(cell.x, cell.y);
         }
         vectorize!(find_directions(map, cells, locations, samples, count));
         look_up(map, locations, count, corners, &mut samples.radiance);

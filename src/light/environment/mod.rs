@@ -19,6 +19,7 @@ use std::sync::OnceLock;
 
 use super::{InfiniteLightEval, LightSample, MisCompensation};
 use crate::color::Rgb;
+use crate::math::prefetch::{address, prefetch_lines};
 use crate::math::{DMat3, Vec3, angle_of, unit_circle};
 use crate::sampling::warp::{UNIFORM_SPHERE_PDF, uniform_sphere};
 use crate::sampling::{Piecewise2d, PiecewiseCell};
@@ -285,6 +286,14 @@ impl EnvironmentMap {
         let upper = y.saturating_sub(1) * self.width;
         let lower = y.min(self.height - 1) * self.width;
         [self.texels[upper + x], self.texels[upper + right], self.texels[lower + x], self.texels[lower + right]]
+    }
+
+    /// Starts to load what [`corners`](Self::corners) reads.
+    #[inline(always)]
+    fn prefetch_corners(&self, x: usize, y: usize) {
+        for row in [y.saturating_sub(1), y.min(self.height - 1)] {
+            prefetch_lines(address(&self.texels, row * self.width + x), 1);
+        }
     }
 
     #[inline]
