@@ -4,6 +4,7 @@
 use serde_json::{Value, json};
 use steradian::internal::accel::AccelKind;
 use steradian::internal::film::LayerKind;
+use steradian::internal::light::LightSelection;
 use steradian::internal::render::{Overrides, RenderResult};
 
 use crate::checkpoints::assert_resumed_split_and_replayed;
@@ -68,6 +69,23 @@ fn the_mean_is_that_of_one_light() {
     }
     let chosen = blocks(json!({ "type": "path" }), 200);
     assert_blocks_agree(&chosen, &one, "chosen by the pilot");
+}
+
+/// By power a lamp is chosen as often wherever the point is; the pictures agree, and differ in noise.
+#[test]
+fn the_mean_is_that_of_lights_chosen_by_power() {
+    let integrator = |sampler: &str| json!({ "type": "path", "light_sampler": sampler, "roulette": "off" });
+    for sampler in ["tree", "power"] {
+        let prepared = prepare(&yard(integrator(sampler)), &overrides(0, 1));
+        let expected = if sampler == "tree" { LightSelection::Tree } else { LightSelection::Power };
+        assert_eq!(prepared.scene.lights.selection(), expected);
+    }
+    let render = |sampler: &str, seed: u64| rendered(integrator(sampler), &overrides(seed, 16)).image;
+    assert_ne!(render("tree", 0), render("power", 0));
+    let blocks = |sampler: &str, first: u64| -> Vec<Vec<f64>> {
+        (first..first + 8).map(|seed| block_means(&render(sampler, seed))).collect()
+    };
+    assert_blocks_agree(&blocks("power", 100), &blocks("tree", 0), "by power");
 }
 
 /// First vertices are within the fog for about half of the paths, and others see the lamps through it.

@@ -6,12 +6,15 @@ use super::CompileContext;
 use super::textures::TextureTable;
 use crate::assets::{AssetError, read_ies, read_rgb_image};
 use crate::color::Rgb;
-use crate::desc::{EnvironmentLightDesc, IesLightDesc, LightDesc, ProjectorLightDesc};
+use crate::desc::{
+    EnvironmentLightDesc, IesLightDesc, IntegratorDesc, LightDesc, LightSamplerDesc, ProjectorLightDesc,
+};
 use crate::error::Result;
+use crate::geometry::Geometry;
 use crate::id::{LightGroupId, LightId};
 use crate::light::{
-    DirectionalLight, Environment, EnvironmentMap, IesLight, IesProfile, Light, LightGroups, PointLight, Projector,
-    SpotLight, TextureProjection,
+    DirectionalLight, Environment, EnvironmentMap, IesLight, IesProfile, Light, LightGroups, LightSelection, LightSet,
+    PointLight, Projector, SpotLight, TextureProjection,
 };
 use crate::math::{DAffine3, DMat3, DVec3, RenderSpace, Vec2};
 use crate::texture::Texture;
@@ -19,6 +22,14 @@ use crate::texture::Texture;
 /// The most letters of a group's name: names of channels have at most 255 in OpenEXR, of which `light_` and the channel
 /// take some.
 const MOST_LETTERS: usize = 240;
+
+/// All lights of a scene, chosen as the integrator wants.
+pub fn set(lights: Vec<Light>, geometry: &Geometry, integrator: &IntegratorDesc) -> LightSet {
+    match integrator.light_sampler() {
+        LightSamplerDesc::Tree => LightSet::new(lights, geometry),
+        LightSamplerDesc::Power => LightSet::with_selection(lights, geometry, LightSelection::Power),
+    }
+}
 
 /// All lights so far, with their groups.
 #[derive(Default)]

@@ -55,7 +55,6 @@ use crate::desc::{CausticsDesc, IntegratorDesc, SceneDesc};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Shape};
 use crate::id::TextureId;
-use crate::light::LightSet;
 use crate::math::{Bounds, RenderSpace};
 use crate::medium::{Medium, Subsurface};
 use crate::scene::{Scene, SceneFeatures, Surface};
@@ -285,7 +284,7 @@ impl Builder {
         self.geometry.cutouts = self.alpha_masks(false);
         let in_use = self.media_in_use();
         let light_groups = self.lights.groups();
-        let lights = LightSet::new(self.lights.lights, &self.geometry);
+        let lights = lights::set(self.lights.lights, &self.geometry, &desc.integrator);
         let sky = !lights.at_infinity().is_empty();
         let has_fog = self.materials.media.surroundings().is_some_and(Medium::is_participating);
         check_visible(files, &self.geometry, sky || has_fog)?;

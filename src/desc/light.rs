@@ -222,3 +222,20 @@ pub struct EnvironmentLightDesc {
 fn one() -> f32 {
     1.0
 }
+
+/// How one light among several is chosen for a light sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LightSamplerDesc {
+    /// By an estimate of what it gives to the point, found by a light tree; lights at infinity by their power.
+    #[default]
+    Tree,
+    /// By its power: less time for a sample, and where there are many lamps much more noise.
+    Power,
+}
+
+impl LightSamplerDesc {
+    pub(super) fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}

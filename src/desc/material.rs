@@ -451,7 +451,7 @@ fn plastic_reflectance() -> ColorDesc {
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde expects")]
-fn is_yes(value: &bool) -> bool {
+pub(super) fn is_yes(value: &bool) -> bool {
     *value
 }
 
@@ -463,7 +463,7 @@ fn is_white(color: &ColorDesc) -> bool {
     }
 }
 
-fn yes() -> bool {
+pub(super) fn yes() -> bool {
     true
 }
 

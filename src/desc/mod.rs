@@ -30,8 +30,8 @@ pub use curves::{CurveBasisDesc, CurveKindDesc};
 pub use files::NamedFile;
 pub use hair::{HairDesc, HairIor, HairRoughness, HairTilt};
 pub use light::{
-    DirectionalLightDesc, EmissionDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, PointLightDesc,
-    ProjectorLightDesc, SpotLightDesc,
+    DirectionalLightDesc, EmissionDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, LightSamplerDesc,
+    PointLightDesc, ProjectorLightDesc, SpotLightDesc,
 };
 pub use material::{
     ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, PlasticDesc, RangedDesc, RoughnessDesc,

@@ -357,7 +357,7 @@ pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
     let Setup { sampler, surface_aovs, light_aovs } = setup;
     let view = |view| Box::new(DebugView { view, surface_aovs, light_aovs }) as Box<dyn Integrator>;
     match *desc {
-        IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp, regularize, hide_emitters, .. } => {
+        IntegratorDesc::Path { max_depth, rr_depth, splitting, strategy, clamp, regularize, hide_emitters, .. } => {
             Box::new(PathIntegrator {
                 max_depth,
                 roulette: match desc.roulette() {
@@ -372,6 +372,7 @@ pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
                 clamp: clamp.unwrap_or(f32::INFINITY),
                 regularization: regularize.map(|alpha| Regularization { alpha }),
                 hide_emitters,
+                splitting,
                 sampler,
                 surface_aovs,
                 light_aovs,

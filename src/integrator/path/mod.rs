@@ -74,6 +74,8 @@ pub struct PathIntegrator {
     pub regularization: Option<Regularization>,
     /// Whether emitters and environments are invisible to the camera.
     pub hide_emitters: bool,
+    /// Whether paths are split at smooth glass.
+    pub splitting: bool,
     /// Where random numbers come from.
     pub sampler: Sampler,
     /// Which AOVs of surfaces are wanted.

@@ -64,7 +64,7 @@ pub(super) fn split(context: &Context, wave: &mut Wave, block: usize) {
     wave.vertices.splits.is_split = [0; BATCH];
     // Pilots attribute all that a sample finds later to each of its vertices.
     let is_pilot = wave.continuations.is_enabled() || context.pass.guidance.has_moments;
-    let Some(emitters) = context.emitter_prims.filter(|_| !is_pilot) else { return };
+    let Some(emitters) = context.emitter_prims.filter(|_| context.config.splitting && !is_pilot) else { return };
     let Wave { vertices, bsdf_rows, branches, cones, light_aovs, .. } = wave;
     sample_reflections(context, vertices, bsdf_rows);
     for &lane in &vertices.split_lanes {
