@@ -227,7 +227,7 @@ pub enum IntegratorDesc {
         /// Default: with roulette auto or shadow_rays, 1 to 4, as its pilot finds the least error for the time; else 1.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         light_samples: Option<u32>,
-        /// How each of them is chosen. Default: tree.
+        /// How a light is chosen for each light sample. Default: tree.
         #[serde(default, skip_serializing_if = "LightSamplerDesc::is_default")]
         light_sampler: LightSamplerDesc,
         /// Whether paths are split at smooth glass whose reflection may show a lamp, into one path that is reflected
