@@ -74,13 +74,19 @@ fn the_mean_is_that_of_one_light() {
 /// By power a lamp is chosen as often wherever the point is; the pictures agree, and differ in noise.
 #[test]
 fn the_mean_is_that_of_lights_chosen_by_power() {
-    let integrator = |sampler: &str| json!({ "type": "path", "light_sampler": sampler, "roulette": "off" });
+    let scene = |sampler: &str| {
+        let mut scene = yard(json!({ "type": "path", "roulette": "off" }));
+        scene["light_sampler"] = json!(sampler);
+        scene
+    };
     for sampler in ["tree", "power"] {
-        let prepared = prepare(&yard(integrator(sampler)), &overrides(0, 1));
+        let prepared = prepare(&scene(sampler), &overrides(0, 1));
         let expected = if sampler == "tree" { LightSelection::Tree } else { LightSelection::Power };
         assert_eq!(prepared.scene.lights.selection(), expected);
     }
-    let render = |sampler: &str, seed: u64| rendered(integrator(sampler), &overrides(seed, 16)).image;
+    let render = |sampler: &str, seed: u64| {
+        render_with(&prepare(&scene(sampler), &overrides(seed, 16)), AccelKind::EMBREE).image
+    };
     assert_ne!(render("tree", 0), render("power", 0));
     let blocks = |sampler: &str, first: u64| -> Vec<Vec<f64>> {
         (first..first + 8).map(|seed| block_means(&render(sampler, seed))).collect()

@@ -6,9 +6,7 @@ use super::CompileContext;
 use super::textures::TextureTable;
 use crate::assets::{AssetError, read_ies, read_rgb_image};
 use crate::color::Rgb;
-use crate::desc::{
-    EnvironmentLightDesc, IesLightDesc, IntegratorDesc, LightDesc, LightSamplerDesc, ProjectorLightDesc,
-};
+use crate::desc::{EnvironmentLightDesc, IesLightDesc, LightDesc, LightSamplerDesc, ProjectorLightDesc};
 use crate::error::Result;
 use crate::geometry::Geometry;
 use crate::id::{LightGroupId, LightId};
@@ -23,9 +21,9 @@ use crate::texture::Texture;
 /// take some.
 const MOST_LETTERS: usize = 240;
 
-/// All lights of a scene, chosen as the integrator wants.
-pub fn set(lights: Vec<Light>, geometry: &Geometry, integrator: &IntegratorDesc) -> LightSet {
-    match integrator.light_sampler() {
+/// All lights of a scene.
+pub fn set(lights: Vec<Light>, geometry: &Geometry, sampler: LightSamplerDesc) -> LightSet {
+    match sampler {
         LightSamplerDesc::Tree => LightSet::new(lights, geometry),
         LightSamplerDesc::Power => LightSet::with_selection(lights, geometry, LightSelection::Power),
     }

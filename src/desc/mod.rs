@@ -120,6 +120,9 @@ pub struct SceneDesc {
     #[serde(default, deserialize_with = "one_or_more", skip_serializing_if = "Vec::is_empty")]
     #[schemars(with = "OneOrMore<LightDesc>")]
     pub lights: Vec<LightDesc>,
+    /// How one light among several is chosen for a light sample. Default: tree.
+    #[serde(default, skip_serializing_if = "LightSamplerDesc::is_default")]
+    pub light_sampler: LightSamplerDesc,
     /// Files to write, each by its name alone or with more keys; the command line's `-o` replaces them.
     #[serde(default, deserialize_with = "output::outputs", skip_serializing_if = "Vec::is_empty")]
     #[schemars(with = "OneOrMore<output::OutputEntrySchema>")]

@@ -8,8 +8,8 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::lists::{Spread, spread};
 
+use super::ViewDesc;
 use super::material::{is_yes, yes};
-use super::{LightSamplerDesc, ViewDesc};
 
 /// The picture's size and its pixel filter.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
@@ -227,9 +227,6 @@ pub enum IntegratorDesc {
         /// Default: with roulette auto or shadow_rays, 1 to 4, as its pilot finds the least error for the time; else 1.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         light_samples: Option<u32>,
-        /// How a light is chosen for each light sample. Default: tree.
-        #[serde(default, skip_serializing_if = "LightSamplerDesc::is_default")]
-        light_sampler: LightSamplerDesc,
         /// Whether paths are split at smooth glass whose reflection may show a lamp, into one path that is reflected
         /// and one that is not: less noise for some time. Default: true.
         #[serde(default = "yes", skip_serializing_if = "is_yes")]
@@ -325,7 +322,6 @@ impl IntegratorDesc {
             rr_depth,
             roulette: None,
             light_samples: None,
-            light_sampler: LightSamplerDesc::default(),
             splitting: true,
             strategy,
             clamp: None,
@@ -335,11 +331,6 @@ impl IntegratorDesc {
             caustics: CausticsDesc::default(),
             bidirectional: AutoDesc::default(),
         }
-    }
-
-    /// How lights are chosen.
-    pub fn light_sampler(&self) -> LightSamplerDesc {
-        if let Self::Path { light_sampler, .. } = *self { light_sampler } else { LightSamplerDesc::default() }
     }
 
     /// Which paths and shadow rays Russian roulette terminates; `None` where there are no paths.

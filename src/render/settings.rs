@@ -326,7 +326,7 @@ fn time_limit(overrides: &Overrides) -> Result<Option<Duration>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::desc::{LightSamplerDesc, PixelTypeDesc, SamplerKindDesc};
+    use crate::desc::{PixelTypeDesc, SamplerKindDesc};
 
     fn scene(text: &str) -> SceneDesc {
         serde_json::from_str(text).unwrap()
@@ -406,7 +406,6 @@ mod tests {
             guiding: AutoDesc::default(),
             roulette: None,
             light_samples: None,
-            light_sampler: LightSamplerDesc::default(),
             splitting: true,
             // Unsupported with such a strategy.
             caustics: CausticsDesc::Paths,

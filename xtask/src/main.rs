@@ -14,8 +14,6 @@ mod compare_refs;
 #[cfg(feature = "tools")]
 mod eval_materials;
 #[cfg(feature = "tools")]
-mod light_choice;
-#[cfg(feature = "tools")]
 mod make_meshes;
 #[cfg(feature = "tools")]
 mod make_textures;
@@ -36,7 +34,6 @@ usage: cargo xtask NAME [ARGUMENT...]
   bench_scenes         meshes of benches/scenes
   compare_refs         compare renders with reference images: REFS [--spp N] [SCENE...]
   eval_materials       evaluate materials for pairs of directions, from JSON on standard input
-  light_choice         compare light tree and power sampling at equal time: [SCENE.json] [--spp N] [--rounds N]
   make_meshes          meshes and sky of scenes/, and scenes/shrine.json
   make_textures        textures of scenes/
   make_vectors         exact test vectors of shapes: crates/bench/src/stability/vectors
@@ -57,7 +54,6 @@ fn run_tool(name: &str, words: Vec<String>) -> Option<Outcome> {
         "bench_scenes" => bench_scenes::run(),
         "compare_refs" => compare_refs::run(words),
         "eval_materials" => eval_materials::run(),
-        "light_choice" => light_choice::run(words),
         "make_meshes" => make_meshes::run(),
         "make_textures" => make_textures::run(),
         "make_vectors" => make_vectors::run(),

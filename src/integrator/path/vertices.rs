@@ -151,7 +151,9 @@ fn gather_indices<'a>(context: &Context<'a>, vertices: &mut Vertices) -> Option<
     instanced.clear();
     // Prefetched, so that all lanes wait for memory together.
     for (lane, mesh) in meshes.iter_mut().enumerate().take(*count) {
-        *mesh = context.world.mesh_without_tangents(ShapeId(rows.shape[lane]));
+        if rows.instance[lane] != Hit::MEDIUM.0 {
+            *mesh = context.world.mesh_without_tangents(ShapeId(rows.shape[lane]));
+        }
         rows.is_unresolved[lane] = u32::from(mesh.is_none());
         if let Some(mesh) = mesh {
             has_triangles = true;
