@@ -12,8 +12,8 @@ pub(super) const WIDTH: usize = 8;
 /// The most entries that wait on the stack: seven a level.
 pub(super) const STACK: usize = 256;
 
-/// A reference to a child: an inner node, a run of triangle blocks, or a run of other items; on the stack of a ray also
-/// the way out of an instance.
+/// A reference to a child: an inner node, a run of triangle blocks, or a run of other items. On the stack of a ray also
+/// the place where it leaves an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Child(u32);
 
