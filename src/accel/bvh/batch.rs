@@ -2,8 +2,8 @@
 //!
 //! Rays are prepared in rows. Then up to [`SLOTS`] are traversed at once: a round opens a node for each ray that is
 //! at one, and tests a leaf for each ray that is at one, so that few branches depend on single rays; what a ray needs
-//! in the next round is prefetched. A ray that meets an instance goes on in the hierarchy of the object, until the entry
-//! on its stack that returns it to that of the world. Answers are those of single rays, bit for bit.
+//! in the next round is prefetched. A ray that meets an instance goes on in the object's hierarchy, until the entry on
+//! its stack that returns it to the world's. Answers are those of single rays, bit for bit.
 
 use std::cell::RefCell;
 use std::hint::select_unpredictable;
@@ -130,7 +130,7 @@ impl PreparedRows {
     }
 }
 
-/// The most entries that wait: those of the world and of an object, one between them, and what is stored beyond the top.
+/// The most entries that wait: those of the world and of an object, one between, and what is stored beyond the top.
 const MAX_ENTRIES: usize = 2 * STACK + 2 * WIDTH;
 
 /// Children that wait. Not a power of two long: else the tops of all stacks were in the same few sets of the cache.
