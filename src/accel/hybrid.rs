@@ -4,7 +4,7 @@
 
 use super::bvh::{Bvh, BvhOptions};
 use super::embree::{EmbreeAccel, EmbreeOptions};
-use super::packet::{Hierarchy, has_intervals};
+use super::packet::{Hierarchy, PacketHitRows, has_intervals};
 use super::tree::TwoLevel;
 use super::{Accelerator, Coherence, HitRows, intersect_in_rows};
 use crate::error::Result;
@@ -112,18 +112,19 @@ struct NearerRows {
 
 /// Ends rays where they hit shapes in packets.
 #[inline(always)]
-fn shorten(t_max: &mut Row, shapes: &Row<u32>, ends: &Row, count: usize) {
-    for i in 0..whole_vectors(count) {
-        t_max[i] = if shapes[i] == HitRows::MISS { t_max[i] } else { ends[i] };
+fn shorten(t_max: &mut Row, on_shapes: &PacketHitRows, count: usize) {
+    let PacketHitRows { prims, ends, .. } = on_shapes;
+    for (i, t_max) in t_max[..whole_vectors(count)].iter_mut().enumerate() {
+        *t_max = if prims[i] == HitRows::MISS { *t_max } else { ends[i] };
     }
 }
 
 /// Compares hits on shapes in packets with hits on others; true if any comparison is open.
 #[inline(always)]
-fn find_nearer(on_shapes: &HitRows, on_others: &HitRows, nearer: &mut NearerRows, count: usize) -> bool {
+fn find_nearer(on_shapes: &PacketHitRows, on_others: &HitRows, nearer: &mut NearerRows, count: usize) -> bool {
     let mut is_any_open = 0;
     for i in 0..count.min(BATCH) {
-        let is_on_shape = on_shapes.shape[i] != HitRows::MISS;
+        let is_on_shape = on_shapes.prims[i] != HitRows::MISS;
         let is_on_other = on_others.shape[i] != HitRows::MISS;
         let is_other_nearer = is_on_other & (on_others.t[i] < on_shapes.t[i]);
         nearer.shape[i] = u32::from(is_on_shape & !is_other_nearer);
@@ -131,21 +132,6 @@ fn find_nearer(on_shapes: &HitRows, on_others: &HitRows, nearer: &mut NearerRows
         is_any_open |= nearer.is_open[i];
     }
     is_any_open != 0
-}
-
-/// Replaces hits by those that are nearer.
-#[inline(always)]
-fn take_nearer(from: &HitRows, is_nearer: &Row<u32>, hits: &mut HitRows, count: usize) {
-    for (i, &is_nearer) in is_nearer[..whole_vectors(count)].iter().enumerate() {
-        let is_taken = is_nearer != 0;
-        let choose = |a: f32, b: f32| if is_taken { a } else { b };
-        (hits.t[i], hits.u[i], hits.v[i]) =
-            (choose(from.t[i], hits.t[i]), choose(from.u[i], hits.u[i]), choose(from.v[i], hits.v[i]));
-        let choose = |a: u32, b: u32| if is_taken { a } else { b };
-        hits.shape[i] = choose(from.shape[i], hits.shape[i]);
-        hits.prim[i] = choose(from.prim[i], hits.prim[i]);
-        hits.instance[i] = choose(from.instance[i], hits.instance[i]);
-    }
 }
 
 /// Whether a shape of the world is traced in packets.
@@ -198,23 +184,29 @@ impl Accelerator for HybridAccel<'_> {
     fn intersect_rows(&self, rays: &RayRows, count: usize, hits: &mut HitRows, coherence: Coherence) {
         let Some(packets) = &self.packets else { return self.others.intersect_rows(rays, count, hits, coherence) };
         let count = count.min(BATCH);
-        let (mut on_shapes, mut ends) = (HitRows::default(), [0.0; BATCH]);
-        packets.intersect_within(rays, count, &mut on_shapes, &mut ends, |ray| self.intersect_shapes(ray));
-        if on_shapes.shape[..count].iter().all(|&shape| shape == HitRows::MISS) {
+        let mut on_shapes = PacketHitRows { t: [0.0; BATCH], prims: [HitRows::MISS; BATCH], ends: [0.0; BATCH] };
+        let left_out = packets.intersect_within(rays, count, &mut on_shapes);
+        if left_out.is_empty() && on_shapes.prims[..count].iter().all(|&prim| prim == HitRows::MISS) {
             return self.others.intersect_rows(rays, count, hits, coherence);
         }
         let mut rest = rays.clone();
-        vectorize!(shorten(&mut rest.t_max, &on_shapes.shape, &ends, count));
+        vectorize!(shorten(&mut rest.t_max, &on_shapes, count));
         self.others.intersect_rows(&rest, count, hits, coherence);
         let mut order = NearerRows { shape: [0; BATCH], is_open: [0; BATCH] };
         if vectorize!(find_nearer(&on_shapes, hits, &mut order, count)) {
             for lane in (0..count).filter(|&lane| order.is_open[lane] != 0) {
                 // Within the limits of the distance to the shape, that in `f64` decides.
-                let exact = packets.exact_distance(ShapeId(on_shapes.shape[lane]), &rays.get(lane));
+                let exact = packets.exact_distance_to(on_shapes.prims[lane], &rays.get(lane));
                 order.shape[lane] = u32::from(!exact.is_some_and(|t| hits.t[lane] < t));
             }
         }
-        vectorize!(take_nearer(&on_shapes, &order.shape, hits, count));
+        for lane in (0..count).filter(|&lane| order.shape[lane] != 0) {
+            hits.t[lane] = on_shapes.t[lane];
+            packets.complete(on_shapes.prims[lane], rays, lane, hits);
+        }
+        for lane in left_out.into_iter().map(usize::from) {
+            hits.set(lane, self.intersect(&rays.get(lane)));
+        }
     }
 
     fn occluded_rows(&self, rays: &RayRows, count: usize, occluded: &mut [bool; BATCH], coherence: Coherence) {

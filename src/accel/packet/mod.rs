@@ -18,6 +18,7 @@ use crate::math::rows::BATCH;
 use crate::math::{Aabb, Ray, RayRows};
 pub(super) use hierarchy::Hierarchy;
 pub(super) use shapes::has_intervals;
+pub(super) use traverse::PacketHitRows;
 
 /// Up to this number of polygons and analytic shapes, packets are faster than Embree (`docs/performance.md`).
 const FEW: usize = 40;

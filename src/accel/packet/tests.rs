@@ -3,7 +3,7 @@ use std::f64::consts::TAU;
 use pulp::x86::{V3, V4};
 use pulp::{Scalar, Simd, WithSimd};
 
-use super::traverse::{Closest, Occluded};
+use super::traverse::{Closest, LeftOut, Occluded};
 use super::*;
 use crate::accel::LinearAccel;
 use crate::accel::tree::testing::{Sequence, mesh_geometry};
@@ -141,8 +141,10 @@ fn packets_hit_what_the_oracle_hits() {
 fn answers<S: Simd>(simd: S, packets: &Hierarchy<'_>, rays: &[Ray]) -> (Vec<Option<Hit>>, Vec<bool>) {
     let (rows, count) = (RayRows::of(rays), rays.len());
     let (mut hits, mut occluded) = (HitRows::default(), [false; BATCH]);
-    let (ends, alone) = (&mut [0.0; BATCH], |_: &Ray| None);
-    Closest::<_, false> { hierarchy: packets, rays: &rows, count, hits: &mut hits, ends, alone }.with_simd(simd);
+    let (ends, left_out) = (&mut [0.0; BATCH], &mut LeftOut::new());
+    let HitRows { t, shape: prims, .. } = &mut hits;
+    Closest::<false> { hierarchy: packets, rays: &rows, count, t, prims, ends, left_out }.with_simd(simd);
+    packets.complete_all(&rows, count, &mut hits);
     Occluded { hierarchy: packets, rays: &rows, count, occluded: &mut occluded, alone: |_: &Ray| false }
         .with_simd(simd);
     ((0..count).map(|lane| hits.get(lane)).collect(), occluded[..count].to_vec())

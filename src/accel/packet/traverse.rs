@@ -18,19 +18,21 @@ use crate::math::{Ray, RayRows};
 impl Hierarchy<'_> {
     /// Closest hits of the first `count` rays. Rays that do not fit into packets are traced by `alone`.
     pub fn intersect(&self, rays: &RayRows, count: usize, hits: &mut HitRows, alone: impl Fn(&Ray) -> Option<Hit>) {
-        run(Closest::<_, false> { hierarchy: self, rays, count, hits, ends: &mut [0.0; BATCH], alone });
+        let (ends, left_out) = (&mut [0.0; BATCH], &mut LeftOut::new());
+        let HitRows { t, shape: prims, .. } = hits;
+        run(Closest::<false> { hierarchy: self, rays, count, t, prims, ends, left_out });
+        self.complete_all(rays, count, hits);
+        for lane in left_out.drain(..).map(usize::from) {
+            hits.set(lane, alone(&rays.get(lane)));
+        }
     }
 
-    /// As [`intersect`](Self::intersect), with upper limits of the distances, or the ends of the rays that hit nothing.
-    pub fn intersect_within(
-        &self,
-        rays: &RayRows,
-        count: usize,
-        hits: &mut HitRows,
-        ends: &mut Row,
-        alone: impl Fn(&Ray) -> Option<Hit>,
-    ) {
-        run(Closest::<_, true> { hierarchy: self, rays, count, hits, ends, alone });
+    /// What the first `count` rays hit first. Returned are the rays that do not fit into packets.
+    pub fn intersect_within(&self, rays: &RayRows, count: usize, hits: &mut PacketHitRows) -> LeftOut {
+        let mut left_out = LeftOut::new();
+        let PacketHitRows { t, prims, ends } = hits;
+        run(Closest::<true> { hierarchy: self, rays, count, t, prims, ends, left_out: &mut left_out });
+        left_out
     }
 
     /// Whether the first `count` rays hit anything.
@@ -38,9 +40,19 @@ impl Hierarchy<'_> {
         run(Occluded { hierarchy: self, rays, count, occluded, alone });
     }
 
+    /// Writes the hits of rays of which the distances are known, and in place of shapes the numbers of primitives.
+    pub(super) fn complete_all(&self, rays: &RayRows, count: usize, hits: &mut HitRows) {
+        for lane in 0..count.min(BATCH) {
+            let prim = hits.shape[lane];
+            if prim != NONE {
+                self.complete(prim, rays, lane, hits);
+            }
+        }
+    }
+
     /// Writes the hit of a ray, of which the distance is known, on the primitive with a number.
     #[inline(always)]
-    fn complete(&self, number: u32, rays: &RayRows, lane: usize, hits: &mut HitRows) {
+    pub fn complete(&self, number: u32, rays: &RayRows, lane: usize, hits: &mut HitRows) {
         let mut prim = &self.prims[number as usize];
         (hits.u[lane], hits.v[lane]) = (0.0, 0.0);
         if prim.is_triangle {
@@ -204,8 +216,13 @@ impl Hierarchy<'_> {
         }
     }
 
+    /// The distance in `f64` at which a ray hits the primitive with a number, if that is an analytic shape.
+    pub fn exact_distance_to(&self, prim: u32, ray: &Ray) -> Option<f32> {
+        self.exact_distance(self.prims[prim as usize].shape, ray)
+    }
+
     /// The distance in `f64` at which a ray hits an analytic shape.
-    pub fn exact_distance(&self, shape: ShapeId, ray: &Ray) -> Option<f32> {
+    fn exact_distance(&self, shape: ShapeId, ray: &Ray) -> Option<f32> {
         match self.geometry.shape(shape) {
             Shape::Analytic(placed) => placed.intersect(ray).map(|hit| hit.t as f32),
             Shape::Mesh(_) | Shape::Curves(_) | Shape::Points(_) => None,
@@ -242,52 +259,54 @@ fn run<K: WithSimd>(kernel: K) -> K::Output {
     }
 }
 
+/// Lanes of rays that do not fit into packets.
+pub(in crate::accel) type LeftOut = ArrayVec<u8, BATCH>;
+
+/// What rays hit first.
+pub(in crate::accel) struct PacketHitRows {
+    /// Distances, as of [`HitRows`].
+    pub t: Row,
+    /// The numbers of the primitives, or [`HitRows::MISS`].
+    pub prims: Row<u32>,
+    /// Upper limits of the distances, or the ends of the rays that hit nothing.
+    pub ends: Row,
+}
+
+const _: () = assert!(NONE == HitRows::MISS);
+
 /// `WITHIN`: with upper limits of the distances, over analytic shapes.
-pub(super) struct Closest<'a, F, const WITHIN: bool> {
+pub(super) struct Closest<'a, const WITHIN: bool> {
     pub hierarchy: &'a Hierarchy<'a>,
     pub rays: &'a RayRows,
     pub count: usize,
-    pub hits: &'a mut HitRows,
+    pub t: &'a mut Row,
+    pub prims: &'a mut Row<u32>,
     /// The limits; not written without `WITHIN`.
     pub ends: &'a mut Row,
-    pub alone: F,
+    pub left_out: &'a mut LeftOut,
 }
 
-impl<F: Fn(&Ray) -> Option<Hit>, const WITHIN: bool> WithSimd for Closest<'_, F, WITHIN> {
+impl<const WITHIN: bool> WithSimd for Closest<'_, WITHIN> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { hierarchy, rays, count, hits, ends, alone } = self;
+        let Self { hierarchy, rays, count, t, prims, ends, left_out } = self;
         for first in (0..count).step_by(S::F32_LANES) {
-            let (mut packet, left_out) = Packet::new(simd, &hierarchy.sphere, rays, first, count - first);
+            let (mut packet, outside) = Packet::new(simd, &hierarchy.sphere, rays, first, count - first);
             let has_shapes = WITHIN || hierarchy.has_shapes;
             if has_shapes {
                 hierarchy.traverse::<S, false, true>(simd, &mut packet);
             } else {
                 hierarchy.traverse::<S, false, false>(simd, &mut packet);
             }
-            let lanes = first..first + S::F32_LANES;
             let reported = if has_shapes { packet.reported } else { packet.t };
-            store_f32s(simd, reported, &mut hits.t[first..]);
-            store_u32s(simd, packet.prim, &mut hits.shape[first..]);
+            store_f32s(simd, reported, &mut t[first..]);
+            store_u32s(simd, packet.prim, &mut prims[first..]);
             if WITHIN {
                 store_f32s(simd, packet.t, &mut ends[first..]);
             }
-            for lane in lanes {
-                let number = hits.shape[lane];
-                if number != NONE {
-                    hierarchy.complete(number, rays, lane, hits);
-                }
-            }
-            for lane in left_out.lanes() {
-                let ray = rays.get(first + lane);
-                let hit = alone(&ray);
-                hits.set(first + lane, hit);
-                if WITHIN {
-                    ends[first + lane] = hit.map_or(ray.t_max, |hit| hit.t);
-                }
-            }
+            left_out.extend(outside.lanes().map(|lane| (first + lane) as u8));
         }
     }
 }
