@@ -83,7 +83,7 @@ impl SceneChanges {
             lights[id.index()] =
                 lights::compile(files, &path, light, scene.camera.render_space(), &TextureTable::default()).ok()?;
         }
-        let lights = lights::set(lights, &scene.geometry, desc.light_sampler);
+        let lights = lights::light_set(lights, &scene.geometry, desc.light_sampler);
         let is_alike = lights.shines() == scene.lights.shines()
             && lights.at_infinity().is_empty() == scene.lights.at_infinity().is_empty();
         is_alike.then_some(Some(lights))

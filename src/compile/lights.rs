@@ -21,8 +21,8 @@ use crate::texture::Texture;
 /// take some.
 const MOST_LETTERS: usize = 240;
 
-/// All lights of a scene.
-pub fn set(lights: Vec<Light>, geometry: &Geometry, sampler: LightSamplerDesc) -> LightSet {
+/// The lights of a scene, with how one is chosen.
+pub fn light_set(lights: Vec<Light>, geometry: &Geometry, sampler: LightSamplerDesc) -> LightSet {
     match sampler {
         LightSamplerDesc::Tree => LightSet::new(lights, geometry),
         LightSamplerDesc::Power => LightSet::with_selection(lights, geometry, LightSelection::Power),

@@ -284,7 +284,7 @@ impl Builder {
         self.geometry.cutouts = self.alpha_masks(false);
         let in_use = self.media_in_use();
         let light_groups = self.lights.groups();
-        let lights = lights::set(self.lights.lights, &self.geometry, desc.light_sampler);
+        let lights = lights::light_set(self.lights.lights, &self.geometry, desc.light_sampler);
         let sky = !lights.at_infinity().is_empty();
         let has_fog = self.materials.media.surroundings().is_some_and(Medium::is_participating);
         check_visible(files, &self.geometry, sky || has_fog)?;

@@ -227,10 +227,11 @@ fn one() -> f32 {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LightSamplerDesc {
-    /// By an estimate of what it gives to the point, found by a light tree; lights at infinity by their power.
+    /// In proportion to an estimate of its contribution at the shading point, by a light tree; lights at infinity by
+    /// their power.
     #[default]
     Tree,
-    /// By its power: less time for a sample, and where there are many lamps much more noise.
+    /// In proportion to its power: faster samples, with much more noise where there are many lights.
     Power,
 }
 

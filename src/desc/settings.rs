@@ -227,8 +227,8 @@ pub enum IntegratorDesc {
         /// Default: with roulette auto or shadow_rays, 1 to 4, as its pilot finds the least error for the time; else 1.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         light_samples: Option<u32>,
-        /// Whether paths are split at smooth glass whose reflection may show a lamp, into one path that is reflected
-        /// and one that is not: less noise for some time. Default: true.
+        /// Whether paths are split at smooth glass whose reflection may show an emitter, into one path that is
+        /// reflected and one that is not: less noise, at some cost in time. Default: true.
         #[serde(default = "yes", skip_serializing_if = "is_yes")]
         splitting: bool,
         /// How directions towards lights are found.

@@ -35,7 +35,12 @@ impl<'g> Items<'g> {
         let mut items = Self::of_shapes(geometry, shapes);
         for (i, instance) in geometry.instances.iter().enumerate() {
             let boxes = &objects[instance.object.index()];
-            let bounds = boxes.iter().fold(Aabb::EMPTY, |all, part| all.union(&instance.bounds(part)));
+            let bounds = if instance.motion.is_none() {
+                boxes.iter().fold(Aabb::EMPTY, |all, part| all.union(&instance.bounds(part)))
+            } else {
+                // Bounds of a motion take long to find.
+                instance.bounds(&boxes.iter().fold(Aabb::EMPTY, |all, part| all.union(part)))
+            };
             if !bounds.is_empty() {
                 items.list.push(Item::instance(InstanceId::new(i)));
                 items.bounds.push(bounds);

@@ -26,6 +26,7 @@ pub(super) fn find(context: &Context, wave: &mut Wave, block: usize) {
     collect_lanes(&mut vertices.misses, count, |path| !lanes.contains(path));
     start_vertices(vertices, &lanes, paths, rays, hits);
     if let Some(meshes) = gather_indices(context, vertices) {
+        transform_instanced_rays(context, vertices);
         gather_triangles(context, vertices, &meshes);
         let Vertices { count, rows, triangles, points, .. } = vertices;
         match (features.shading_normals, features.parameters) {
@@ -172,6 +173,12 @@ fn gather_indices<'a>(context: &Context<'a>, vertices: &mut Vertices) -> Option<
                 mesh.triangles()[rows.prim[lane] as usize];
         }
     }
+    Some(meshes)
+}
+
+/// Takes rays that hit triangles of instances into the spaces of these.
+fn transform_instanced_rays(context: &Context, vertices: &mut Vertices) {
+    let Vertices { rows, triangles, instanced, .. } = vertices;
     triangles.direction = rows.direction.clone();
     for &lane in &*instanced {
         let lane = usize::from(lane);
@@ -181,7 +188,6 @@ fn gather_indices<'a>(context: &Context<'a>, vertices: &mut Vertices) -> Option<
         triangles.origin.set(lane, ray.origin);
         triangles.direction.set(lane, ray.direction);
     }
-    Some(meshes)
 }
 
 /// Places the points of instanced triangles, and their normals, in the world.
@@ -196,7 +202,7 @@ fn place_instanced(context: &Context, vertices: &mut Vertices) {
         points.p.set(lane, at.p);
         rows.n_g.set(lane, at.n_g);
         rows.n_s.set(lane, at.n_s);
-        // The density of uv is that of the object.
+        // Zero: the density per area of the object is not that of the world.
         (rows.error[lane], rows.uv_density[lane]) = (at.error, 0.0);
     }
 }
