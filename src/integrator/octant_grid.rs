@@ -1,5 +1,6 @@
 //! Cells of surface points.
 
+use crate::math::float::{WHOLE, floor};
 use crate::math::{Aabb, Vec3};
 
 /// Octants of normals.
@@ -24,13 +25,18 @@ impl<const SIDE: usize> OctantGrid<SIDE> {
     /// [`cell_count`]`(SIDE)`.
     #[inline(always)]
     pub fn cell(&self, p: Vec3, n: Vec3) -> u32 {
-        let side = SIDE as i32;
-        let last = (SIDE - 1) as f32;
-        // NaN becomes 0.
-        let at = |k: usize| ((p[k] - self.corner[k]) * self.cells_per_unit).clamp(0.0, last) as i32;
-        let octant = i32::from(n.x < 0.0) | i32::from(n.y < 0.0) << 1 | i32::from(n.z < 0.0) << 2;
-        let cell = (at(2) * side + at(1)) * side + at(0);
-        (cell * OCTANTS as i32 + octant) as u32
+        let (side, last) = (SIDE as f32, (SIDE - 1) as f32);
+        let at = |k: usize| {
+            let x = (p[k] - self.corner[k]) * self.cells_per_unit;
+            // NaN becomes 0.
+            let x = if x > 0.0 { x } else { 0.0 };
+            floor(if x < last { x } else { last })
+        };
+        let bit = |k: usize| if n[k] < 0.0 { (1 << k) as f32 } else { 0.0 };
+        let cell = ((at(2) * side + at(1)) * side + at(0)) * OCTANTS as f32 + bit(0) + bit(1) + bit(2);
+        const { assert!(cell_count(SIDE) <= 1 << 23) };
+        // Whole numbers below 2^23 are exact, and the mantissa of their sum with it: a cast would not be vector code.
+        (cell + WHOLE).to_bits() - WHOLE.to_bits()
     }
 
     /// The cell of a grid over the same box with a smaller side around a cell, with the same octant.
@@ -42,7 +48,7 @@ impl<const SIDE: usize> OctantGrid<SIDE> {
 }
 
 /// Cells of a grid with this side.
-pub fn cell_count(side: usize) -> usize {
+pub const fn cell_count(side: usize) -> usize {
     side.pow(3) * OCTANTS
 }
 

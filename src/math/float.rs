@@ -17,11 +17,12 @@ pub const SMALLEST_NORMAL: f32 = f32::MIN_POSITIVE;
 /// The largest `f32` below one: random numbers and parameters stay within `[0, 1)`.
 pub const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
 
+/// 2^23: floats from this magnitude on are integers.
+pub const WHOLE: f32 = 8_388_608.0;
+
 /// `x.floor()` except for the sign of zero; inlined, where that is a library call without SSE4.1.
 #[inline(always)]
 pub fn floor(x: f32) -> f32 {
-    /// Numbers from this magnitude on are integers.
-    const WHOLE: f32 = 8_388_608.0;
     // No conversion to integers: one that saturates is not compiled to vector code.
     let shift = WHOLE.copysign(x);
     let rounded = (x + shift) - shift;
