@@ -55,6 +55,7 @@ pub const fn cell_count(side: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Rng;
 
     #[test]
     fn cells_are_by_position_and_octant_and_end_with_the_box() {
@@ -66,5 +67,17 @@ mod tests {
         let cells = [[2.5, 1.5, 0.5], [3.5, 0.5, 1.5]].map(|p| cell(p, [1.0; 3]));
         assert_eq!(cells.map(|cell| OctantGrid::<16>::coarser_cell(cell, 8)), [OCTANTS; 2]);
         assert_eq!(OctantGrid::<16>::new(&Aabb::EMPTY).cell(Vec3::ONE, Vec3::ONE), 0);
+    }
+    #[test]
+    fn cells_are_those_of_whole_numbers() {
+        let grid = OctantGrid::<32>::new(&Aabb { min: Vec3::new(-1.0, 2.0, -3.0), max: Vec3::new(4.0, 3.0, 1.0) });
+        let mut random = Rng::new(17);
+        for _ in 0..20_000 {
+            let p = random.direction().as_vec3() * 6.0 * random.unit_f32();
+            let n = random.direction().as_vec3();
+            let at = |k: usize| ((p[k] - grid.corner[k]) * grid.cells_per_unit).clamp(0.0, 31.0) as u32;
+            let octant = (0..3).map(|k| u32::from(n[k] < 0.0) << k).sum::<u32>();
+            assert_eq!(grid.cell(p, n), ((at(2) * 32 + at(1)) * 32 + at(0)) * 8 + octant, "{p} {n}");
+        }
     }
 }
