@@ -35,7 +35,7 @@ impl<const SIDE: usize> OctantGrid<SIDE> {
         let bit = |k: usize| if n[k] < 0.0 { (1 << k) as f32 } else { 0.0 };
         let cell = ((at(2) * side + at(1)) * side + at(0)) * OCTANTS as f32 + bit(0) + bit(1) + bit(2);
         const { assert!(cell_count(SIDE) <= 1 << 23) };
-        // Whole numbers below 2^23 are exact, and the mantissa of their sum with it: a cast would not be vector code.
+        // An integer below 2^23 is the mantissa of its sum with 2^23. A cast saturates, which is not vector code.
         (cell + WHOLE).to_bits() - WHOLE.to_bits()
     }
 
@@ -68,8 +68,9 @@ mod tests {
         assert_eq!(cells.map(|cell| OctantGrid::<16>::coarser_cell(cell, 8)), [OCTANTS; 2]);
         assert_eq!(OctantGrid::<16>::new(&Aabb::EMPTY).cell(Vec3::ONE, Vec3::ONE), 0);
     }
+
     #[test]
-    fn cells_are_those_of_whole_numbers() {
+    fn cells_are_those_of_integer_arithmetic() {
         let grid = OctantGrid::<32>::new(&Aabb { min: Vec3::new(-1.0, 2.0, -3.0), max: Vec3::new(4.0, 3.0, 1.0) });
         let mut random = Rng::new(17);
         for _ in 0..20_000 {

@@ -38,7 +38,7 @@ impl<'g> Items<'g> {
             let bounds = if instance.motion.is_none() {
                 boxes.iter().fold(Aabb::EMPTY, |all, part| all.union(&instance.bounds(part)))
             } else {
-                // Bounds of a motion take long to find.
+                // One box for all: bounds of a motion are those of many intervals of the shutter.
                 instance.bounds(&boxes.iter().fold(Aabb::EMPTY, |all, part| all.union(part)))
             };
             if !bounds.is_empty() {
