@@ -161,6 +161,53 @@ impl Shear {
         let [x, y, dz] = permuted(direction, kz).map(f64::from);
         Self { sx: x / dz, sy: y / dz, dz, origin: permuted(origin, kz).map(f64::from).into() }
     }
+
+    /// The edge functions of a triangle with these corners, whose coordinates are along `kx`, `ky` and `kz`.
+    #[inline(always)]
+    pub fn edges(&self, corners: [DVec3; 3]) -> EdgeFunctions {
+        // Corners relative to the origin (exact differences of f32 up to one rounding), sheared.
+        let [a, b, c] = corners.map(|p| {
+            let p = p - self.origin;
+            DVec3::new(p.x - self.sx * p.z, p.y - self.sy * p.z, p.z)
+        });
+        let (u, v, w) = (c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x);
+        EdgeFunctions { u, v, w, z: [a.z, b.z, c.z] }
+    }
+}
+
+/// The edge functions of a triangle for a ray on the axis `kz`: twice the areas that two corners each span with it.
+#[derive(Clone, Copy, Debug)]
+pub struct EdgeFunctions {
+    /// Opposite to the first corner.
+    pub u: f64,
+    /// Opposite to the second corner.
+    pub v: f64,
+    /// Opposite to the third corner.
+    pub w: f64,
+    /// Of the corners, relative to the origin of the ray.
+    z: [f64; 3],
+}
+
+impl EdgeFunctions {
+    /// Whether the ray passes the triangle. A point on an edge belongs to both neighbours.
+    #[inline(always)]
+    pub fn is_outside(&self) -> bool {
+        let Self { u, v, w, .. } = *self;
+        ((u < 0.0) | (v < 0.0) | (w < 0.0)) & ((u > 0.0) | (v > 0.0) | (w > 0.0))
+    }
+
+    /// The sum, which the barycentric coordinates are fractions of; zero where the ray is parallel to the triangle.
+    #[inline(always)]
+    pub fn determinant(&self) -> f64 {
+        self.u + self.v + self.w
+    }
+
+    /// The distance to the plane of the triangle, in units of a direction whose component along `kz` is `dz`.
+    #[inline(always)]
+    pub fn distance(&self, dz: f64) -> f64 {
+        let [a, b, c] = self.z;
+        (self.u * a + self.v * b + self.w * c) / (self.determinant() * dz)
+    }
 }
 
 /// The axis along which a direction is largest.
@@ -214,29 +261,19 @@ impl TriangleRay {
     /// The hit within the ray's interval, with either side up.
     #[inline]
     pub fn intersect(&self, triangle: &TrianglePoints) -> Option<TriangleHit> {
-        let Self { kz, shear: Shear { sx, sy, dz, origin }, .. } = *self;
-
-        // Corners relative to the origin (exact differences of f32 up to one rounding), sheared.
-        let corner = |p: Vec3| {
-            let p = DVec3::from(permuted(p, kz).map(f64::from)) - origin;
-            (p.x - sx * p.z, p.y - sy * p.z, p.z)
-        };
-        let ((ax, ay, az), (bx, by, bz), (cx, cy, cz)) = (corner(triangle.a), corner(triangle.b), corner(triangle.c));
-
-        // Edge functions; a point on an edge belongs to both neighbours.
-        let u = cx * by - cy * bx;
-        let v = ax * cy - ay * cx;
-        let w = bx * ay - by * ax;
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+        let corner = |p: Vec3| DVec3::from(permuted(p, self.kz).map(f64::from));
+        let edges = self.shear.edges([corner(triangle.a), corner(triangle.b), corner(triangle.c)]);
+        let determinant = edges.determinant();
+        if edges.is_outside() || determinant == 0.0 {
             return None;
         }
-        let determinant = u + v + w;
-        if determinant == 0.0 {
-            return None;
-        }
-        let t = (u * az + v * bz + w * cz) / (determinant * dz);
+        let t = edges.distance(self.shear.dz);
         let contained = self.t_min <= t && t <= self.t_max;
-        contained.then(|| TriangleHit { t: t as f32, u: (v / determinant) as f32, v: (w / determinant) as f32 })
+        contained.then(|| TriangleHit {
+            t: t as f32,
+            u: (edges.v / determinant) as f32,
+            v: (edges.w / determinant) as f32,
+        })
     }
 }
 

@@ -10,10 +10,12 @@ use std::hint::select_unpredictable;
 
 use super::Bvh;
 use super::any_hit_order::{AnyHitOrder, MeasuredOrders};
+use super::best_hits::BestHits;
+use super::coherent::{Occupancy, PacketStack};
 use super::lanes::{SimdIsa, WideRay};
 use super::wide::{Block, Child, ChildKind, Entry, STACK, WIDTH, Wide, WideNode};
-use crate::accel::inspect::{Item, ItemKind};
-use crate::accel::tree::{Answers, NotCounted, Query, SlabRay, SlabRows, TwoLevel, t_max_after};
+use crate::accel::inspect::ItemKind;
+use crate::accel::tree::{Answers, SlabRay, SlabRows, TwoLevel};
 use crate::geometry::{Hit, Shear, ShearRows, TriangleHit, TriangleRay, largest_axis};
 use crate::id::InstanceId;
 use crate::math::compact::set_bits;
@@ -36,21 +38,24 @@ pub(super) struct Batch<'r, 'a> {
 }
 
 /// What is found of rays before they are traced.
-struct PreparedRows {
-    slabs: SlabRows,
-    shears: ShearRows,
-    axes: Row<u32>,
-    is_valid: Row<u32>,
+pub(super) struct PreparedRows {
+    pub slabs: SlabRows,
+    pub shears: ShearRows,
+    pub axes: Row<u32>,
+    /// Zero also where a ray is answered.
+    pub is_valid: Row<u32>,
 }
 
 /// What one thread needs to trace batches.
 pub(super) struct Scratch {
-    prepared: PreparedRows,
+    pub prepared: PreparedRows,
+    pub packets: PacketStack,
+    pub occupancy: Occupancy,
     /// Of rays in instances, in their spaces.
     in_object: PreparedRows,
     object_rays: RayRows,
-    t_max: Row,
-    keys: Row<u32>,
+    pub t_max: Row,
+    pub keys: Row<u32>,
     /// The node or leaf that each ray visits next.
     next: [Child; BATCH],
     stacks: [Stack; SLOTS],
@@ -70,6 +75,8 @@ impl Default for Scratch {
     fn default() -> Self {
         Self {
             prepared: PreparedRows::default(),
+            packets: PacketStack::default(),
+            occupancy: Occupancy::default(),
             in_object: PreparedRows::default(),
             object_rays: RayRows::default(),
             t_max: [0.0; BATCH],
@@ -82,9 +89,8 @@ impl Default for Scratch {
 }
 
 impl Scratch {
-    /// Prepares the rays of a batch.
-    #[inline(always)]
-    fn prepare(&mut self, wide: &Wide, batch: &Batch<'_, '_>) {
+    /// Prepares the rays of a batch, none of which has been answered.
+    pub fn prepare(&mut self, wide: &Wide, batch: &Batch<'_, '_>, answers: &mut impl Answers) {
         let rays = batch.rays;
         let count = whole_vectors(batch.count);
         vectorize!(self.prepared.set(wide, batch, count));
@@ -93,6 +99,9 @@ impl Scratch {
         let cutouts = &batch.accel.geometry().cutouts;
         for (i, keys) in self.keys.chunks_mut(ROW_WIDTH).enumerate().take(count / ROW_WIDTH) {
             cutouts.set_keys(rays, i * ROW_WIDTH, keys);
+        }
+        for lane in 0..batch.count.min(BATCH) {
+            answers.set(lane, None);
         }
     }
 }
@@ -127,6 +136,13 @@ impl PreparedRows {
         self.slabs.set(lane, &SlabRay::new(ray, bounds, 0.0));
         self.axes[lane] = largest_axis(ray.direction);
         self.shears.set(lane, &Shear::new(ray.origin, ray.direction, self.axes[lane]));
+    }
+
+    /// The ray of a lane up to `t_max`, prepared for triangles. `rays` have the others of its limits.
+    #[inline(always)]
+    pub fn triangle_ray(&self, lane: usize, rays: &RayRows, t_max: f32) -> TriangleRay {
+        let (t_min, t_max) = (rays.t_min[lane].into(), t_max.into());
+        TriangleRay { kz: self.axes[lane], shear: self.shears.get(lane), t_min, t_max }
     }
 }
 
@@ -185,7 +201,7 @@ struct Space<'r> {
     instance: InstanceId,
 }
 
-/// The closest hits of rays, or `ANY` hits, in a scene with or without `INSTANCES`.
+/// The closest hits of rays that are prepared and not answered, or `ANY` hits, in a scene with or without `INSTANCES`.
 #[inline(always)]
 pub(super) fn trace<'r, L: SimdIsa, const ANY: bool, const INSTANCES: bool>(
     lanes: L,
@@ -195,10 +211,6 @@ pub(super) fn trace<'r, L: SimdIsa, const ANY: bool, const INSTANCES: bool>(
     answers: &mut impl Answers,
 ) {
     let count = batch.count.min(BATCH);
-    scratch.prepare(wide, batch);
-    for lane in 0..count {
-        answers.set(lane, None);
-    }
     let any_hit_order = if ANY { scratch.any_hit_orders.next() } else { AnyHitOrder::Distance };
     let world = Space { wide, instance: Hit::NO_INSTANCE };
     let mut tracer = Tracer::<_, INSTANCES> {
@@ -324,7 +336,11 @@ impl<'r, A: Answers, const INSTANCES: bool> Tracer<'_, 'r, '_, A, INSTANCES> {
                     }
                     false
                 } else {
-                    self.test_items::<ANY>(items, slot, lane)
+                    let (ray, triangle_ray) = (self.ray(slot, lane), self.triangle_ray(slot, lane));
+                    let instance = self.space(slot).instance;
+                    let Scratch { keys, t_max, .. } = &mut *self.scratch;
+                    let mut best = BestHits { accel: self.batch.accel, keys, t_max, answers: &mut *self.answers };
+                    best.test_items::<ANY>(lane, items, instance, &ray, triangle_ray)
                 }
             }
             ChildKind::Node(_) | ChildKind::Leave => false,
@@ -383,47 +399,25 @@ impl<'r, A: Answers, const INSTANCES: bool> Tracer<'_, 'r, '_, A, INSTANCES> {
 
     #[inline(always)]
     fn triangle_ray(&self, slot: usize, lane: usize) -> TriangleRay {
-        let prepared = self.prepared(slot);
-        let (t_min, t_max) = (self.batch.rays.t_min[lane].into(), self.scratch.t_max[lane].into());
-        TriangleRay { kz: prepared.axes[lane], shear: prepared.shears.get(lane), t_min, t_max }
+        self.prepared(slot).triangle_ray(lane, self.batch.rays, self.scratch.t_max[lane])
     }
 
     /// Tests up to four triangles. True if the ray is answered.
     #[inline(always)]
     fn test_block<L: SimdIsa, const ANY: bool>(&mut self, lanes: L, block: &Block, slot: usize, lane: usize) -> bool {
         let ray = self.triangle_ray(slot, lane);
-        let geometry = self.batch.accel.geometry();
-        let instance = self.space(slot).instance;
         let Some(hits) = lanes.intersect(block, &ray) else { return false };
+        let (instance, is_in_object) = (self.space(slot).instance, self.is_in_object(slot));
+        let Scratch { keys, t_max, object_rays, .. } = &mut *self.scratch;
+        let rays = if is_in_object { object_rays } else { self.batch.rays };
+        let mut best = BestHits { accel: self.batch.accel, keys, t_max, answers: &mut *self.answers };
         for i in set_bits(hits.mask) {
             let ItemKind::Prim(shape, prim) = block.items[i].kind() else { continue };
             let TriangleHit { t, u, v } = hits.get(i);
-            let hit = Hit { t, u, v, shape, prim, instance };
-            let is_better = ANY || self.answers.get(lane).is_none_or(|best| hit.is_before(&best));
-            let key = self.scratch.keys[lane];
-            if is_better && geometry.cutouts.counts(&geometry.shapes, key, &self.ray(slot, lane), &hit) {
-                self.answers.set(lane, Some(hit));
-                self.scratch.t_max[lane] = t_max_after(&hit, self.scratch.t_max[lane]);
-                if ANY {
-                    return true;
-                }
+            if best.offer::<ANY>(lane, &Hit { t, u, v, shape, prim, instance }, || rays.get(lane)) {
+                return true;
             }
         }
         false
-    }
-
-    /// Tests items other than triangles. True if the ray is answered.
-    #[inline(never)]
-    fn test_items<const ANY: bool>(&mut self, items: &[Item], slot: usize, lane: usize) -> bool {
-        let ray = Ray { t_max: self.scratch.t_max[lane], ..self.ray(slot, lane) };
-        let (counter, key) = (&mut NotCounted, self.scratch.keys[lane]);
-        let mut query =
-            Query::<_, _, ANY>::prepared(self.batch.accel, ray, self.triangle_ray(slot, lane), key, counter);
-        query.instance = self.space(slot).instance;
-        query.best = self.answers.get(lane);
-        let is_answered = items.iter().any(|&item| query.test(item));
-        self.answers.set(lane, query.best);
-        self.scratch.t_max[lane] = query.t_max();
-        is_answered
     }
 }

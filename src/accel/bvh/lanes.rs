@@ -8,6 +8,7 @@ use super::build::BLOCK;
 use super::wide::{Block, Child, Entry, WIDTH, WideNode};
 use crate::accel::tree::SlabRay;
 use crate::geometry::{Shear, TriangleHit, TriangleRay};
+use crate::math::DVec3;
 use crate::math::compact::ORDER_OF_8;
 
 /// A [`SlabRay`] with the rows of a node that it meets first and last.
@@ -102,22 +103,16 @@ impl SimdIsa for Portable {
         let mut hits = BlockHits { mask: 0, t: [0.0; BLOCK], edges: [[0.0; BLOCK]; 3] };
         let (axes, shear) = (ray.axes(), &ray.shear);
         for lane in 0..BLOCK {
-            let corner = |c: usize| {
-                let at = |i: usize| f64::from(block.corners[c][axes[i]][lane]) - shear.origin[i];
-                let z = at(2);
-                (at(0) - shear.sx * z, at(1) - shear.sy * z, z)
-            };
-            let ((ax, ay, az), (bx, by, bz), (cx, cy, cz)) = (corner(0), corner(1), corner(2));
-            let (u, v, w) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
-            if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+            let corner = |c: usize| DVec3::from(axes.map(|axis| f64::from(block.corners[c][axis][lane])));
+            let edges = shear.edges([corner(0), corner(1), corner(2)]);
+            if edges.is_outside() {
                 continue;
             }
-            let determinant = u + v + w;
-            let t = (u * az + v * bz + w * cz) / (determinant * shear.dz);
+            let (determinant, t) = (edges.determinant(), edges.distance(shear.dz));
             let inside = determinant != 0.0 && ray.t_min <= t && t <= ray.t_max;
             hits.mask |= u32::from(inside) << lane;
             hits.t[lane] = t;
-            for (row, value) in hits.edges.iter_mut().zip([v, w, determinant]) {
+            for (row, value) in hits.edges.iter_mut().zip([edges.v, edges.w, determinant]) {
                 row[lane] = value;
             }
         }

@@ -2,8 +2,10 @@
 
 mod any_hit_order;
 mod batch;
+mod best_hits;
 mod binary;
 mod build;
+mod coherent;
 mod collapse;
 mod lanes;
 mod reinsertion;
@@ -12,14 +14,16 @@ mod tests;
 mod traverse;
 mod wide;
 
-use pulp::x86::V3;
+use pulp::x86::{V3, V4};
 
+use super::Coherence;
 use super::inspect::NodeInfo;
 use super::tree::{Answers, Counter, Items, Query, Tree, TwoLevel};
 use crate::math::{Aabb, RayRows};
 use batch::{Batch, Scratch};
 use binary::BinaryTree;
 pub(super) use build::{Binary, BinaryKind, MAX_LEAF, Reference};
+use coherent::PacketIsa;
 use lanes::Portable;
 use wide::{ChildKind, STACK, WIDTH, Wide};
 
@@ -51,6 +55,24 @@ impl<C: Counter, const ANY: bool> pulp::NullaryFnOnce for Run<'_, '_, C, ANY> {
     #[inline(always)]
     fn call(self) {
         traverse::traverse(self.simd, self.wide, self.query);
+    }
+}
+
+/// Traces rays of a batch in packets of `S`.
+struct PacketRun<'r, 'a, S, A> {
+    simd: (S, V3),
+    wide: &'r Wide,
+    batch: &'r Batch<'r, 'a>,
+    scratch: &'r mut Scratch,
+    answers: &'r mut A,
+}
+
+impl<S: PacketIsa, A: Answers> pulp::NullaryFnOnce for PacketRun<'_, '_, S, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        coherent::trace(self.simd, self.wide, self.batch, self.scratch, self.answers);
     }
 }
 
@@ -143,12 +165,22 @@ impl Tree for Bvh {
         rays: &RayRows,
         count: usize,
         answers: &mut impl Answers,
+        coherence: Coherence,
     ) {
         let Layout::Wide(wide, Some(simd)) = &accel.world().0 else {
             return accel.trace_one_by_one::<ANY>(rays, count, answers);
         };
         batch::with_scratch(|scratch| {
             let batch = Batch { accel, rays, count };
+            scratch.prepare(wide, &batch, answers);
+            if coherence == Coherence::Coherent && !ANY && accel.geometry().instances.is_empty() {
+                let (simd, batch) = (*simd, &batch);
+                if let Some(v4) = V4::try_new() {
+                    v4.vectorize(PacketRun { simd: (v4, simd), wide, batch, scratch, answers });
+                } else {
+                    simd.vectorize(PacketRun { simd: (simd, simd), wide, batch, scratch, answers });
+                }
+            }
             simd.vectorize(BatchRun::<_, ANY> { simd: *simd, wide, batch, scratch, answers });
         });
     }

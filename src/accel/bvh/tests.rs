@@ -22,7 +22,7 @@ fn many(n: usize) -> usize {
 }
 
 /// Points on a coarse grid now and then, so that edges, corners and planes are met exactly.
-fn corner(random: &mut Sequence) -> Vec3 {
+pub(super) fn corner(random: &mut Sequence) -> Vec3 {
     let p = random.vec();
     if random.below(2) == 0 { (p * 4.0).round() * 0.25 } else { p }
 }
@@ -210,14 +210,14 @@ fn rays_in_rows_have_the_answers_of_single_rays() {
     assert!(hits > 2_000, "{hits}");
 }
 
-fn mesh(triangles: &[[Vec3; 3]]) -> Geometry {
+pub(super) fn mesh(triangles: &[[Vec3; 3]]) -> Geometry {
     let positions = triangles.iter().flatten().map(Vec3::to_array).collect();
     let indices = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     let mesh = Mesh::new(positions, indices, None, None).unwrap();
     Geometry { shapes: vec![Shape::Mesh(mesh)], world: vec![ShapeId(0)], ..Geometry::default() }
 }
 
-fn soup(random: &mut Sequence, count: usize) -> Geometry {
+pub(super) fn soup(random: &mut Sequence, count: usize) -> Geometry {
     let triangles: Vec<_> = (0..count)
         .map(|_| {
             let center = corner(random);

@@ -36,6 +36,9 @@ impl Child {
     /// Where a ray leaves an instance.
     pub const LEAVE: Self = Self(3 << 30);
 
+    /// Of each slot the number, in place of the child.
+    pub const SLOTS: [Self; WIDTH] = [Self(0), Self(1), Self(2), Self(3), Self(4), Self(5), Self(6), Self(7)];
+
     fn node(index: usize) -> Self {
         Self(index as u32)
     }

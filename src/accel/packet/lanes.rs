@@ -9,7 +9,7 @@ use crate::math::rows::Row;
 use crate::math::{Aabb, RayRows, Vec3};
 
 /// A vector in each lane.
-pub(super) type Vector<S> = [<S as Simd>::f32s; 3];
+pub(in crate::accel) type Vector<S> = [<S as Simd>::f32s; 3];
 
 /// Rays that start farther from the middle of the scene than this many times its radius are traced alone.
 pub(super) const REACH: f32 = 8.0;
@@ -125,13 +125,13 @@ impl LaneSet {
 
 /// As many numbers, from `first` on, as there are lanes.
 #[inline(always)]
-pub(super) fn load<S: Simd>(_: S, row: &[f32], first: usize) -> S::f32s {
+pub(in crate::accel) fn load<S: Simd>(_: S, row: &[f32], first: usize) -> S::f32s {
     S::as_simd_f32s(&row[first..first + S::F32_LANES]).0[0]
 }
 
 /// Writes the numbers of all lanes to the start of `to`, which has room for them.
 #[inline(always)]
-pub(super) fn store_f32s<S: Simd>(_: S, values: S::f32s, to: &mut [f32]) {
+pub(in crate::accel) fn store_f32s<S: Simd>(_: S, values: S::f32s, to: &mut [f32]) {
     S::as_mut_simd_f32s(&mut to[..S::F32_LANES]).0[0] = values;
 }
 
@@ -206,7 +206,7 @@ pub(super) fn within<S: Simd>(simd: S, a: S::f32s, low: S::f32s, high: S::f32s) 
 
 /// Vectors of a row from `first` on.
 #[inline(always)]
-fn load_vector<S: Simd>(simd: S, rows: &[Row; 3], first: usize) -> Vector<S> {
+pub(in crate::accel) fn load_vector<S: Simd>(simd: S, rows: &[Row; 3], first: usize) -> Vector<S> {
     [load(simd, &rows[0], first), load(simd, &rows[1], first), load(simd, &rows[2], first)]
 }
 

@@ -17,6 +17,7 @@ use crate::geometry::{Analytic, Geometry, Hit, Shape};
 use crate::math::rows::BATCH;
 use crate::math::{Aabb, Ray, RayRows};
 pub(super) use hierarchy::Hierarchy;
+pub(super) use lanes::{Vector, load, load_vector, store_f32s};
 pub(super) use shapes::has_intervals;
 pub(super) use traverse::PacketHitRows;
 

@@ -14,8 +14,8 @@ pub(super) use query::{Counter, NotCounted, Query, t_max_after};
 pub(super) use slab::{SlabRay, SlabRows};
 pub(super) use two_level::TwoLevel;
 
-use super::HitRows;
 use super::inspect::NodeInfo;
+use super::{Coherence, HitRows};
 use crate::geometry::Hit;
 use crate::math::rows::BATCH;
 use crate::math::{Aabb, RayRows};
@@ -73,6 +73,7 @@ pub(super) trait Tree: Send + Sync + Sized {
         rays: &RayRows,
         count: usize,
         answers: &mut impl Answers,
+        _: Coherence,
     ) {
         accel.trace_one_by_one::<ANY>(rays, count, answers);
     }

@@ -141,12 +141,12 @@ impl<T: Tree> Accelerator for TwoLevel<'_, T> {
         self.query::<_, true>(ray, &mut NotCounted).is_some()
     }
 
-    fn intersect_rows(&self, rays: &RayRows, count: usize, hits: &mut HitRows, _: Coherence) {
-        T::trace_rows::<false>(self, rays, count.min(BATCH), hits);
+    fn intersect_rows(&self, rays: &RayRows, count: usize, hits: &mut HitRows, coherence: Coherence) {
+        T::trace_rows::<false>(self, rays, count.min(BATCH), hits, coherence);
     }
 
-    fn occluded_rows(&self, rays: &RayRows, count: usize, occluded: &mut [bool; BATCH], _: Coherence) {
-        T::trace_rows::<true>(self, rays, count.min(BATCH), occluded);
+    fn occluded_rows(&self, rays: &RayRows, count: usize, occluded: &mut [bool; BATCH], coherence: Coherence) {
+        T::trace_rows::<true>(self, rays, count.min(BATCH), occluded, coherence);
     }
 
     fn bounds(&self) -> Aabb {
