@@ -39,9 +39,17 @@ const PERIOD: u32 = 16;
 pub(super) trait PacketIsa: Simd {
     /// A bit for each lane.
     fn bits(self, mask: Self::m32s) -> u32;
+
+    /// The instructions for the eight boxes of a node.
+    fn for_boxes(self) -> V3;
 }
 
 impl PacketIsa for V3 {
+    #[inline(always)]
+    fn for_boxes(self) -> V3 {
+        self
+    }
+
     #[inline(always)]
     fn bits(self, mask: Self::m32s) -> u32 {
         self.avx._mm256_movemask_ps(pulp::cast(mask)) as u32 & 255
@@ -49,6 +57,11 @@ impl PacketIsa for V3 {
 }
 
 impl PacketIsa for V4 {
+    #[inline(always)]
+    fn for_boxes(self) -> V3 {
+        *self
+    }
+
     #[inline(always)]
     fn bits(self, mask: Self::m32s) -> u32 {
         mask.0.into()
@@ -157,8 +170,8 @@ impl<S: PacketIsa> Packet<S> {
             shear: [load(s, &sx, 0), load(s, &sy, 0)],
             origin: axes.map(|axis| load(s, &rays.origin.0[axis], first)),
             axes,
-            // The corner, seen from the origin, is within twice the reach; it has one rounding, as have its shear, which
-            // is at most 1, and their difference.
+            // The corner, seen from the origin, is within twice the reach; it has one rounding, as have its shear,
+            // which is at most 1, and their difference.
             error: s.splat_f32s((12.0 * UNIT_ROUNDOFF) as f32 * 2.0 * reach),
             octant: slabs.negative[first] as usize % 8,
         }
@@ -278,7 +291,7 @@ fn is_packet(prepared: &PreparedRows, first: usize, lanes: usize) -> bool {
 /// no longer valid.
 #[inline(always)]
 pub(super) fn trace<S: PacketIsa>(
-    simd: (S, V3),
+    simd: S,
     wide: &Wide,
     batch: &Batch<'_, '_>,
     scratch: &mut Scratch,
@@ -289,7 +302,7 @@ pub(super) fn trace<S: PacketIsa>(
     }
     let Scratch { prepared, packets, keys, t_max, .. } = scratch;
     let best = BestHits { accel: batch.accel, keys, t_max, answers };
-    let mut tracer = Tracer { simd: simd.0, boxes: simd.1, wide, batch, prepared, best, lanes: 0, entering: 0 };
+    let mut tracer = Tracer { simd, wide, batch, prepared, best, lanes: 0, entering: 0 };
     for first in (0..batch.count.min(BATCH)).step_by(S::F32_LANES) {
         if first + S::F32_LANES <= batch.count && is_packet(tracer.prepared, first, S::F32_LANES) {
             tracer.trace(packets, first);
@@ -302,7 +315,6 @@ pub(super) fn trace<S: PacketIsa>(
 
 struct Tracer<'t, 'r, 'a, S, A> {
     simd: S,
-    boxes: V3,
     wide: &'r Wide,
     batch: &'t Batch<'r, 'a>,
     prepared: &'t mut PreparedRows,
@@ -325,7 +337,7 @@ impl<S: PacketIsa, A: Answers> Tracer<'_, '_, '_, S, A> {
         let mut node = &self.wide.nodes[0];
         stack.len = 0;
         loop {
-            let (slots, count) = limits.enter(self.boxes, node, last_t_max);
+            let (slots, count) = limits.enter(s.for_boxes(), node, last_t_max);
             for &slot in &slots[..count] {
                 let (near, entering) = packet.enter(s, node, slot % WIDTH, t_max);
                 if entering != 0 {
@@ -415,7 +427,8 @@ struct TriangleHits {
     v: [f32; DOUBLES],
 }
 
-/// [`TriangleRay::intersect`](crate::geometry::TriangleRay::intersect) for [`DOUBLES`] rays from `first` on, with the very same operations.
+/// [`TriangleRay::intersect`](crate::geometry::TriangleRay::intersect) for [`DOUBLES`] rays from `first` on, with the
+/// very same operations.
 #[inline(always)]
 fn intersect(corners: [DVec3; 3], prepared: &PreparedRows, rays: &RayRows, t_max: &Row, first: usize) -> TriangleHits {
     let mut hits = TriangleHits { mask: 0, t: [0.0; DOUBLES], u: [0.0; DOUBLES], v: [0.0; DOUBLES] };

@@ -60,7 +60,7 @@ impl<C: Counter, const ANY: bool> pulp::NullaryFnOnce for Run<'_, '_, C, ANY> {
 
 /// Traces rays of a batch in packets of `S`.
 struct PacketRun<'r, 'a, S, A> {
-    simd: (S, V3),
+    simd: S,
     wide: &'r Wide,
     batch: &'r Batch<'r, 'a>,
     scratch: &'r mut Scratch,
@@ -174,11 +174,11 @@ impl Tree for Bvh {
             let batch = Batch { accel, rays, count };
             scratch.prepare(wide, &batch, answers);
             if coherence == Coherence::Coherent && !ANY && accel.geometry().instances.is_empty() {
-                let (simd, batch) = (*simd, &batch);
+                let batch = &batch;
                 if let Some(v4) = V4::try_new() {
-                    v4.vectorize(PacketRun { simd: (v4, simd), wide, batch, scratch, answers });
+                    v4.vectorize(PacketRun { simd: v4, wide, batch, scratch, answers });
                 } else {
-                    simd.vectorize(PacketRun { simd: (simd, simd), wide, batch, scratch, answers });
+                    simd.vectorize(PacketRun { simd: *simd, wide, batch, scratch, answers });
                 }
             }
             simd.vectorize(BatchRun::<_, ANY> { simd: *simd, wide, batch, scratch, answers });

@@ -67,15 +67,15 @@ fn scene(random: &mut Sequence, size: f32) -> Geometry {
 
 /// Hits of rays that were traced in packets, with each instruction set, and which these are.
 fn trace_packets(accel: &TwoLevel<'_, Bvh>, rays: &RayRows) -> Vec<(HitRows, Row<u32>)> {
-    let (wide, boxes) = (accel.world().as_wide().unwrap(), V3::try_new().unwrap());
+    let (wide, v3) = (accel.world().as_wide().unwrap(), V3::try_new().unwrap());
     let batch = &Batch { accel, rays, count: BATCH };
     let mut traced = Vec::new();
     for v4 in [None, V4::try_new()] {
         let (scratch, answers) = (&mut *Box::<Scratch>::default(), &mut HitRows::default());
         scratch.prepare(wide, batch, answers);
         match v4 {
-            Some(v4) => v4.vectorize(PacketRun { simd: (v4, boxes), wide, batch, scratch, answers }),
-            None => boxes.vectorize(PacketRun { simd: (boxes, boxes), wide, batch, scratch, answers }),
+            Some(v4) => v4.vectorize(PacketRun { simd: v4, wide, batch, scratch, answers }),
+            None => v3.vectorize(PacketRun { simd: v3, wide, batch, scratch, answers }),
         }
         traced.push((answers.clone(), scratch.prepared.is_valid.map(|is_valid| 1 - is_valid)));
     }
