@@ -93,7 +93,7 @@ impl Occupancy {
 /// Children that wait.
 #[repr(align(64))]
 pub(super) struct PacketStack {
-    /// Where each ray enters: infinity where it does not.
+    /// Where each ray enters: NaN where it does not.
     near: [[f32; MAX_LANES]; STACK + WIDTH],
     children: [Child; STACK + WIDTH],
     len: usize,
@@ -177,7 +177,7 @@ impl<S: PacketIsa> Packet<S> {
         }
     }
 
-    /// Where each ray enters the box of a child before `t_max`, else infinity.
+    /// Where each ray enters the box of a child before `t_max`, else NaN; and which rays do.
     #[inline(always)]
     fn enter(&self, simd: S, node: &WideNode, slot: usize, t_max: S::f32s) -> (S::f32s, u32) {
         let s = simd;
@@ -190,7 +190,7 @@ impl<S: PacketIsa> Packet<S> {
             far = s.min_f32s(s.mul_f32s(b, self.far_reciprocal[axis]), far);
         }
         let is_entering = s.less_than_or_equal_f32s(near, far);
-        (s.select_f32s(is_entering, near, s.splat_f32s(f32::INFINITY)), s.bits(is_entering))
+        (s.select_f32s(is_entering, near, s.splat_f32s(f32::NAN)), s.bits(is_entering))
     }
 
     /// The rays that may hit a triangle of a block.
