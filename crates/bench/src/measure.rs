@@ -446,10 +446,10 @@ fn work_per_ray(inspect: &dyn Inspect, rays: &[Ray], any_hit: bool) -> [f64; 2] 
     [work.nodes, work.prims].map(|n| n as f64 / rays.len().max(1) as f64)
 }
 
-/// The queries of an accelerator: batches where it traces their rays in packets, coherent ones where Embree gets them.
+/// The queries of an accelerator: batches where it traces rays together, coherent ones where it has packets for them.
 fn modes(kind: RayKind, accel: &str) -> &'static [Mode] {
-    match (accel.split(':').next(), kind) {
-        (Some("auto" | "embree" | "hybrid"), RayKind::Camera) => &[Mode::Single, Mode::Batch, Mode::CoherentBatch],
+    match (accel.split(':').next(), kind == RayKind::Camera) {
+        (Some("auto" | "embree" | "hybrid" | "bvh"), true) => &[Mode::Single, Mode::Batch, Mode::CoherentBatch],
         (Some("auto" | "embree" | "hybrid" | "packets" | "bvh"), _) => &[Mode::Single, Mode::Batch],
         _ => &[Mode::Single],
     }
