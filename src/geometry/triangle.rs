@@ -189,7 +189,7 @@ pub struct EdgeFunctions {
 }
 
 impl EdgeFunctions {
-    /// Whether the ray passes the triangle. A point on an edge belongs to both neighbours.
+    /// Whether the ray misses the triangle. A point on an edge belongs to both neighbours.
     #[inline(always)]
     pub fn is_outside(&self) -> bool {
         let Self { u, v, w, .. } = *self;

@@ -1,7 +1,7 @@
 //! Packets of coherent rays through the wide hierarchy: as many rays as a vector has lanes.
 //!
 //! Interval arithmetic finds the children that any ray of a packet may meet, whose boxes are tested with all its rays
-//! side by side. At leaves, `f32` excludes rays that pass a triangle by more than a bound of its errors; the others are
+//! side by side. At leaves, `f32` excludes rays that miss a triangle by more than a bound of its errors; the others are
 //! tested in `f64`. Answers are those of single rays, bit for bit.
 
 use pulp::Simd;
@@ -24,15 +24,15 @@ use crate::math::{DVec3, RayRows};
 const LARGEST_RECIPROCAL: f32 = 1e30;
 
 /// Rays that are tested together in `f64`.
-const DOUBLES: usize = 8;
+const F64_LANES: usize = 8;
 
 /// Of fewer rays, each is tested alone in `f64`.
-const MIN_DOUBLES: u32 = 2;
+const MIN_F64_RAYS: u32 = 2;
 
-/// Packets pay where at least this part of their rays enters the nodes and leaves that they visit.
+/// Packets are faster where at least this part of their rays enters the nodes and leaves that they visit.
 const MIN_OCCUPANCY: f32 = 0.28;
 
-/// Where packets do not pay, one of so many batches is traced in packets, to measure them again.
+/// Where packets are slower, one of so many batches is traced in packets, to measure them again.
 const PERIOD: u32 = 16;
 
 /// An instruction set with vectors of a packet's rays.
@@ -275,7 +275,7 @@ impl Limits {
 
 /// Whether rays from `first` on fit into a packet: all are valid, of one octant, and largest along the same axis.
 #[inline(always)]
-fn is_packet(prepared: &PreparedRows, first: usize, lanes: usize) -> bool {
+fn is_coherent(prepared: &PreparedRows, first: usize, lanes: usize) -> bool {
     let PreparedRows { slabs, axes, is_valid, .. } = prepared;
     let mut is_other = false;
     for lane in first..first + lanes {
@@ -287,8 +287,8 @@ fn is_packet(prepared: &PreparedRows, first: usize, lanes: usize) -> bool {
     !is_other
 }
 
-/// Finds the closest hits of rays of a batch that fit into packets, in a scene without instances. Then these rays are
-/// no longer valid.
+/// Finds the closest hits of rays of a batch that fit into packets, in a scene without instances, and clears
+/// [`PreparedRows::is_valid`] of these.
 #[inline(always)]
 pub(super) fn trace<S: PacketIsa>(
     simd: S,
@@ -304,7 +304,7 @@ pub(super) fn trace<S: PacketIsa>(
     let best = BestHits { accel: batch.accel, keys, t_max, answers };
     let mut tracer = Tracer { simd, wide, batch, prepared, best, lanes: 0, entering: 0 };
     for first in (0..batch.count.min(BATCH)).step_by(S::F32_LANES) {
-        if first + S::F32_LANES <= batch.count && is_packet(tracer.prepared, first, S::F32_LANES) {
+        if first + S::F32_LANES <= batch.count && is_coherent(tracer.prepared, first, S::F32_LANES) {
             tracer.trace(packets, first);
             tracer.prepared.is_valid[first..first + S::F32_LANES].fill(0);
         }
@@ -364,17 +364,7 @@ impl<S: PacketIsa, A: Answers> Tracer<'_, '_, '_, S, A> {
         match leaf.kind() {
             ChildKind::Blocks { first: start, count } => {
                 for block in &self.wide.blocks[start as usize..(start + count) as usize] {
-                    for triangle in 0..(block.count as usize).min(block.items.len()) {
-                        let may_hit = packet.may_hit(self.simd, block, triangle) & entering;
-                        for part in (0..S::F32_LANES).step_by(DOUBLES) {
-                            let lanes = may_hit >> part & ((1 << DOUBLES) - 1);
-                            if lanes.count_ones() >= MIN_DOUBLES {
-                                self.test_together(packet, block, triangle, lanes, first + part);
-                            } else if lanes != 0 {
-                                self.test_alone(block, triangle, first + part + lanes.trailing_zeros() as usize);
-                            }
-                        }
-                    }
+                    self.test_block(packet, block, entering, first);
                 }
             }
             ChildKind::Items { first: start, count } => {
@@ -390,13 +380,29 @@ impl<S: PacketIsa, A: Answers> Tracer<'_, '_, '_, S, A> {
         }
     }
 
-    /// Tests some of [`DOUBLES`] rays with a triangle in `f64`.
+    /// Tests some of the packet's rays with the triangles of a block.
+    #[inline(always)]
+    fn test_block(&mut self, packet: &Packet<S>, block: &Block, entering: u32, first: usize) {
+        for triangle in 0..(block.count as usize).min(block.items.len()) {
+            let may_hit = packet.may_hit(self.simd, block, triangle) & entering;
+            for part in (0..S::F32_LANES).step_by(F64_LANES) {
+                let lanes = may_hit >> part & ((1 << F64_LANES) - 1);
+                if lanes.count_ones() >= MIN_F64_RAYS {
+                    self.test_together(packet, block, triangle, lanes, first + part);
+                } else if lanes != 0 {
+                    self.test_alone(block, triangle, first + part + lanes.trailing_zeros() as usize);
+                }
+            }
+        }
+    }
+
+    /// Tests some of [`F64_LANES`] rays with a triangle in `f64`.
     #[inline(always)]
     fn test_together(&mut self, packet: &Packet<S>, block: &Block, triangle: usize, lanes: u32, first: usize) {
         let corners = block.corners.map(|rows| DVec3::from(packet.axes.map(|axis| f64::from(rows[axis][triangle]))));
         let hits = intersect(corners, self.prepared, self.batch.rays, self.best.t_max, first);
         for i in set_bits(hits.mask & lanes) {
-            let hit = TriangleHit { t: hits.t[i % DOUBLES], u: hits.u[i % DOUBLES], v: hits.v[i % DOUBLES] };
+            let hit = TriangleHit { t: hits.t[i % F64_LANES], u: hits.u[i % F64_LANES], v: hits.v[i % F64_LANES] };
             self.offer(block, triangle, hit, first + i);
         }
     }
@@ -422,17 +428,17 @@ impl<S: PacketIsa, A: Answers> Tracer<'_, '_, '_, S, A> {
 /// Which of some rays hit a triangle, where.
 struct TriangleHits {
     mask: u32,
-    t: [f32; DOUBLES],
-    u: [f32; DOUBLES],
-    v: [f32; DOUBLES],
+    t: [f32; F64_LANES],
+    u: [f32; F64_LANES],
+    v: [f32; F64_LANES],
 }
 
-/// [`TriangleRay::intersect`](crate::geometry::TriangleRay::intersect) for [`DOUBLES`] rays from `first` on, with the
+/// [`TriangleRay::intersect`](crate::geometry::TriangleRay::intersect) for [`F64_LANES`] rays from `first` on, with the
 /// very same operations.
 #[inline(always)]
 fn intersect(corners: [DVec3; 3], prepared: &PreparedRows, rays: &RayRows, t_max: &Row, first: usize) -> TriangleHits {
-    let mut hits = TriangleHits { mask: 0, t: [0.0; DOUBLES], u: [0.0; DOUBLES], v: [0.0; DOUBLES] };
-    let mut is_hit = [0; DOUBLES];
+    let mut hits = TriangleHits { mask: 0, t: [0.0; F64_LANES], u: [0.0; F64_LANES], v: [0.0; F64_LANES] };
+    let mut is_hit = [0; F64_LANES];
     for (i, is_hit) in is_hit.iter_mut().enumerate() {
         let lane = first + i;
         let shear = prepared.shears.get(lane);

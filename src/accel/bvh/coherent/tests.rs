@@ -11,7 +11,7 @@ use crate::id::{PrimId, ShapeId};
 use crate::math::{Ray, Transform};
 
 #[test]
-fn packets_are_traced_while_they_pay_and_measured_again_when_not() {
+fn packets_are_traced_while_they_are_faster_and_measured_again_when_not() {
     let mut occupancy = Occupancy::default();
     let mut trace = |entering: u32, batches: usize| {
         let chosen = (0..batches).filter(|_| {
