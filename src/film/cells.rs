@@ -1,7 +1,5 @@
 //! Where weighted samples are summed: pixels with a border that shared samples reach.
 
-use super::filter::Taps;
-
 /// The entries of a tile: its pixels in square cells, each with a border of entries for pixels of other cells that its
 /// samples reach. All samples of a cell's pixels are as many. Without a border, there is one cell, and its entries are
 /// the pixels.
@@ -51,10 +49,15 @@ impl Cells {
         if self.border == 0 {
             return pixel;
         }
+        self.cell_of(pixel) * self.entries_of_cell() + self.entry_within_cell(pixel)
+    }
+
+    /// The entry of a pixel in its own cell, counted from the cell's first.
+    #[inline]
+    pub fn entry_within_cell(&self, pixel: usize) -> usize {
         let (x, y) = (pixel as u32 % self.width, pixel as u32 / self.width);
-        let cell = (y / self.size[1] * self.count[0] + x / self.size[0]) as usize;
         let row = (y % self.size[1] + self.border) as usize;
-        cell * self.entries_of_cell() + row * self.stride() + (x % self.size[0] + self.border) as usize
+        row * self.stride() + (x % self.size[0] + self.border) as usize
     }
 
     /// The entry of the pixel at this place of the tile in the cell of this column and row, whose border reaches it.
@@ -63,27 +66,5 @@ impl Cells {
         let [column, row] = [(cell[0], self.size[0], x), (cell[1], self.size[1], y)]
             .map(|(cell, size, at)| (at - (cell * size) as i32 + self.border as i32) as usize);
         (cell[1] * self.count[0] + cell[0]) as usize * self.entries_of_cell() + row * self.stride() + column
-    }
-
-    /// Calls `f` with every entry that a sample of the pixel with this entry reaches, and its weight there.
-    #[inline]
-    pub fn for_each_tap(&self, entry: usize, taps: &[Taps; 2], f: impl FnMut(usize, f32)) {
-        // The usual counts are constants, for unrolled loops.
-        match [taps[0].count, taps[1].count] {
-            [2, 2] => self.for_each_tap_counted(entry, taps, [2, 2], f),
-            [3, 3] => self.for_each_tap_counted(entry, taps, [3, 3], f),
-            counts => self.for_each_tap_counted(entry, taps, counts, f),
-        }
-    }
-
-    #[inline(always)]
-    fn for_each_tap_counted(&self, entry: usize, taps: &[Taps; 2], counts: [usize; 2], mut f: impl FnMut(usize, f32)) {
-        let stride = self.stride() as isize;
-        for row in 0..counts[1] {
-            let first = entry as isize + (taps[1].first as isize + row as isize) * stride + taps[0].first as isize;
-            for column in 0..counts[0] {
-                f((first + column as isize) as usize, taps[1].weights[row] * taps[0].weights[column]);
-            }
-        }
     }
 }

@@ -192,7 +192,8 @@ fn shared(desc: FilterDesc, crop: Crop, block_size: Option<u32>, samples: impl F
             for sample in 0..samples(x, y) {
                 let place = filter.sample([rng.unit_f32(), rng.unit_f32()]);
                 let value = gray(x as f32 + 100.0 * y as f32 + 10.0 * rng.unit_f32());
-                assert!(tile.splat(pixel, sample, &value, &filter.splat_taps(place), &mut splats));
+                let at = WorldSample { sample, place, ..tile.world_sample(pixel) };
+                assert!(tile.splat(&at, &value, &filter, &mut splats));
                 tile.flush(pixel, &mut splats);
             }
         }
@@ -313,10 +314,11 @@ fn batches_have_the_bits_of_single_samples() {
                 Some(pixel) => batch.surfaces[pixel].uv[1] = f32::INFINITY,
                 None => {}
             }
-            let placed = |i: u32| WorldSample { slot: i, pixel: 63 - i, sample, weight: 1.0 };
-            let (one, all) = (&mut alone.tiles_mut()[0], (0..64).map(placed).collect::<Vec<_>>());
-            for &WorldSample { slot, pixel, sample, weight } in &all {
-                if one.add(pixel as usize, sample, batch.sample(slot as usize), weight) {
+            let one = &mut alone.tiles_mut()[0];
+            let placed = |i: u32| WorldSample { slot: i, sample, ..one.world_sample(63 - i as usize) };
+            let all: Vec<_> = (0..64).map(placed).collect();
+            for &WorldSample { slot, pixel, sample, place, .. } in &all {
+                if one.add(pixel as usize, sample, batch.sample(slot as usize), place.weight) {
                     one.add_moments(pixel as usize, batch.radiance(slot as usize));
                 }
             }

@@ -8,6 +8,7 @@
 use std::f64::consts::TAU;
 
 use super::Crop;
+use super::shared_weights::{MAX_TAPS, SharedWeights};
 use crate::desc::{FilterDesc, FilterSamplesDesc};
 use crate::math::Vec2;
 
@@ -15,14 +16,8 @@ use crate::math::Vec2;
 /// it).
 const CELLS: usize = 1024;
 
-/// Cells of the offsets within a pixel, an even number: usual filters have their kinks at ends of cells.
-const OFFSET_CELLS: usize = 256;
-
 /// Steps of the integration that makes a table.
-const STEPS: usize = 1 << 15;
-
-/// Most pixels along an axis that a shared sample reaches.
-const MAX_TAPS: usize = 8;
+pub(super) const STEPS: usize = 1 << 15;
 
 /// Steps per pixel of the integrals of [`VarianceKernel`].
 const KERNEL_STEPS: u32 = 1000;
@@ -35,20 +30,6 @@ pub struct Filter {
     shared: Option<Box<SharedWeights>>,
 }
 
-/// The weights of shared samples by offset from their pixel's centre, along one axis; linear within a cell of offsets,
-/// so that kinks and ends of the filter within a cell (none at the usual radii) are smoothed.
-#[derive(Clone, Debug)]
-struct SharedWeights {
-    /// As [`Filter::border`].
-    border: i32,
-    /// How many pixels have weights: 2, 3, 4 or [`MAX_TAPS`].
-    count: usize,
-    /// By cell of offsets: the first pixel.
-    first: [i8; OFFSET_CELLS],
-    /// By cell: the weights at its lower end, then what they grow by up to the upper one.
-    weights: Vec<f32>,
-}
-
 /// An offset from the pixel's centre and the weight of a sample there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilterSample {
@@ -58,16 +39,11 @@ pub struct FilterSample {
     pub weight: f32,
 }
 
-/// The weights of a shared sample for the pixels along one axis. Over all offsets within a pixel, the weights of a
-/// sample have a mean sum of 1.
-#[derive(Clone, Copy, Debug)]
-pub struct Taps {
-    /// The first pixel, counted from the sample's own.
-    pub first: i32,
-    /// How many pixels; the weights beyond are 0.
-    pub count: usize,
-    /// By pixel.
-    pub weights: [f32; MAX_TAPS],
+impl Default for FilterSample {
+    /// The pixel's centre.
+    fn default() -> Self {
+        Self { offset: Vec2::ZERO, weight: 1.0 }
+    }
 }
 
 /// How the noise of pixels' own samples becomes that of the filtered picture. Along one axis, for the pixels `-border
@@ -175,28 +151,13 @@ impl Filter {
 
     /// How many pixels beyond its own a sample reaches in each direction.
     pub fn border(&self) -> u32 {
-        self.shared.as_ref().map_or(0, |shared| shared.border as u32)
+        self.shared.as_ref().map_or(0, |shared| shared.border() as u32)
     }
 
-    /// The weights along one axis of a shared sample at this offset from its pixel's centre, from -0.5 to 0.5.
+    /// The weights of shared samples.
     #[inline]
-    pub(super) fn taps(&self, offset: f32) -> Taps {
-        match &self.shared {
-            None => Taps { first: 0, count: 1, weights: [1.0; MAX_TAPS] },
-            // The usual counts are constants, for unrolled loops.
-            Some(shared) => match shared.count {
-                2 => shared.taps::<2>(offset),
-                3 => shared.taps::<3>(offset),
-                4 => shared.taps::<4>(offset),
-                _ => shared.taps::<MAX_TAPS>(offset),
-            },
-        }
-    }
-
-    /// The weights along both axes of a shared sample.
-    #[inline]
-    pub fn splat_taps(&self, place: FilterSample) -> [Taps; 2] {
-        [self.taps(place.offset.x), self.taps(place.offset.y)]
+    pub(super) fn shared_weights(&self) -> Option<&SharedWeights> {
+        self.shared.as_deref()
     }
 
     /// How noise of pixels becomes that of the filtered picture.
@@ -253,49 +214,6 @@ impl VarianceKernel {
     }
 }
 
-impl SharedWeights {
-    fn new(desc: &FilterDesc) -> Self {
-        let radius = f64::from(desc.radius());
-        let half: f64 = (0..STEPS)
-            .map(|i| (i as f64 + 0.5) * radius / STEPS as f64)
-            .map(|x| evaluate(desc, x) * radius / STEPS as f64)
-            .sum();
-        let border = (radius - 0.5).ceil() as i32;
-        let count = Some((2.0 * radius).ceil() as usize).filter(|count| *count <= 4).unwrap_or(MAX_TAPS);
-        let (mut first, mut weights) = ([0; OFFSET_CELLS], Vec::with_capacity(2 * OFFSET_CELLS * count));
-        for (cell, first) in first.iter_mut().enumerate() {
-            let ends = [cell, cell + 1].map(|end| end as f64 / OFFSET_CELLS as f64 - 0.5);
-            let pixel = ((ends[0] - radius).floor() as i32 + 1).min(border + 1 - count as i32).max(-border);
-            *first = pixel as i8;
-            let weight = |k: usize, end: f64| {
-                if pixel + k as i32 > border {
-                    0.0
-                } else {
-                    evaluate(desc, f64::from(pixel + k as i32) - end) / (2.0 * half)
-                }
-            };
-            weights.extend((0..count).map(|k| weight(k, ends[0]) as f32));
-            weights.extend((0..count).map(|k| (weight(k, ends[1]) - weight(k, ends[0])) as f32));
-        }
-        Self { border, count, first, weights }
-    }
-
-    #[inline(always)]
-    fn taps<const N: usize>(&self, offset: f32) -> Taps {
-        let at = (offset + 0.5) * OFFSET_CELLS as f32;
-        let cell = (at as i32).clamp(0, OFFSET_CELLS as i32 - 1);
-        let within = at - cell as f32;
-        let cell = cell as usize;
-        let (low, growth) = self.weights[2 * N * cell..2 * N * (cell + 1)].split_at(N);
-        let mut weights = [0.0; MAX_TAPS];
-        for k in 0..N {
-            weights[k] = low[k] + within * growth[k];
-        }
-        let first = i32::from(self.first[cell]);
-        Taps { first, count: N.min((self.border + 1 - first) as usize), weights }
-    }
-}
-
 /// Inverts the distribution of a tent on `[-1, 1]`.
 #[inline(always)]
 fn tent(u: f32) -> f32 {
@@ -304,7 +222,7 @@ fn tent(u: f32) -> f32 {
 }
 
 /// One axis of a filter.
-fn evaluate(desc: &FilterDesc, x: f64) -> f64 {
+pub(super) fn evaluate(desc: &FilterDesc, x: f64) -> f64 {
     let radius = f64::from(desc.radius());
     let x = x.abs();
     if x > radius {

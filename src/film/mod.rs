@@ -14,6 +14,7 @@ mod layer;
 mod nearest;
 mod resolve;
 mod sample;
+mod shared_weights;
 mod splats;
 mod state;
 mod sum;
@@ -22,7 +23,7 @@ mod tiles;
 
 pub use crate::desc::LayerKind;
 pub use coverage::{Coverage, CoverageCounts};
-pub use filter::{Filter, FilterSample, Taps, VarianceKernel};
+pub use filter::{Filter, FilterSample, VarianceKernel};
 pub use identities::{Identities, Label, NameId, PlacementId, ShapeIdentity};
 pub use image::{Crop, Image, Layer};
 pub use layer::{Filtering, LayerInfo, LayerSet, LayerSource};

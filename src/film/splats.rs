@@ -2,8 +2,9 @@
 
 use super::accumulator::{Accumulator, Values};
 use super::cells::Cells;
-use super::filter::Taps;
+use super::shared_weights::Footprint;
 use super::sum::SumPlane;
+use crate::color::Rgb;
 
 /// Sums over few samples of one cell, in the order in which they come: a pass over the cell. Sums of passes then go
 /// into exact sums, so that each sample touches several pixels at little cost.
@@ -19,45 +20,32 @@ impl Splats {
     /// A bound for the sum of weights that reach an entry in a pass of a few samples per pixel, with ample room.
     pub const MOST_TERMS: f32 = 1e6;
 
-    /// Adds a sample of the pixel with this entry.
-    #[inline]
-    pub(super) fn add(&mut self, cells: &Cells, entry: usize, taps: &[Taps; 2], values: &Values) {
-        let count = cells.entries_of_cell();
+    /// Adds the radiance and alpha of a sample of a cell with this many entries.
+    #[inline(always)]
+    pub(super) fn add_color<const N: usize>(&mut self, entries: usize, footprint: &Footprint<N>, color: [f32; 4]) {
         if self.color.is_empty() {
-            self.color.resize(count, [0.0; 8]);
+            self.color.resize(entries, [0.0; 8]);
         }
-        let entry = entry % count;
-        let [r, g, b, a] = values.color;
-        let terms = [r, g, b, a, 1.0, 0.0, 0.0, 0.0];
-        cells.for_each_tap(entry, taps, |entry, weight| {
-            for (sum, term) in self.color[entry].iter_mut().zip(terms) {
-                *sum += weight * term;
-            }
-        });
-        values.for_each_average(|k, value| {
-            let sums = plane(&mut self.averages, k, count);
-            let terms = [value.r, value.g, value.b, 0.0];
-            cells.for_each_tap(entry, taps, |entry, weight| {
-                for (sum, term) in sums[entry].iter_mut().zip(terms) {
-                    *sum += weight * term;
-                }
-            });
+        let [r, g, b, a] = color;
+        footprint.add(&mut self.color, [r, g, b, a, 1.0, 0.0, 0.0, 0.0]);
+    }
+
+    /// Adds all values of a sample.
+    #[inline(always)]
+    pub(super) fn add<const N: usize>(&mut self, entries: usize, footprint: &Footprint<N>, values: &Values) {
+        self.add_color(entries, footprint, values.color);
+        values.for_each_average(|k, Rgb { r, g, b }| {
+            footprint.add(plane(&mut self.averages, k, entries), [r, g, b, 0.0]);
         });
     }
 
     /// Adds all samples to the entries of a cell, and empties itself.
     pub(super) fn flush(&mut self, cells: &Cells, cell: usize, filtered: &mut Accumulator, weights: &mut SumPlane<1>) {
         let first = cell * cells.entries_of_cell();
-        for (entry, color) in (first..).zip(&self.color) {
-            let [r, g, b, a, w, ..] = color.map(f64::from);
-            filtered.color.add(entry, [r, g, b, a]);
-            weights.add(entry, [w]);
-        }
+        filtered.color.add_run(first, self.color.iter().map(|&[r, g, b, a, ..]| [r, g, b, a].map(f64::from)));
+        weights.add_run(first, self.color.iter().map(|&[_, _, _, _, weight, ..]| [f64::from(weight)]));
         for (k, sums) in self.averages.iter().enumerate().filter(|(_, sums)| !sums.is_empty()) {
-            let plane = filtered.average_mut(k);
-            for (entry, &[r, g, b, _]) in (first..).zip(sums) {
-                plane.add(entry, [r, g, b].map(f64::from));
-            }
+            filtered.average_mut(k).add_run(first, sums.iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)));
         }
         self.color.clear();
         self.averages.iter_mut().for_each(Vec::clear);

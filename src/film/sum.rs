@@ -33,11 +33,14 @@ impl<const N: usize> SumPlane<N> {
     /// Adds to each sum of an entry.
     #[inline(always)]
     pub fn add(&mut self, entry: usize, terms: [f64; N]) {
-        let (high, low) = (&mut self.high[entry], &mut self.low[entry]);
-        for k in 0..N {
-            let (sum, error) = two_sum(high[k], terms[k]);
-            high[k] = sum;
-            low[k] += error as f32;
+        add_terms(&mut self.high[entry], &mut self.low[entry], &terms);
+    }
+
+    /// Adds to each sum of consecutive entries.
+    #[inline(always)]
+    pub fn add_run(&mut self, first: usize, terms: impl Iterator<Item = [f64; N]>) {
+        for ((high, low), terms) in self.high[first..].iter_mut().zip(&mut self.low[first..]).zip(terms) {
+            add_terms(high, low, &terms);
         }
     }
 

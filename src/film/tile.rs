@@ -4,9 +4,12 @@ use super::accumulator::{Accumulator, SampleMoments, Values};
 use super::cells::Cells;
 use super::layer::MAX_MEANS;
 use super::nearest::Nearest;
+use super::shared_weights::{MAX_TAPS, SharedWeights};
 use super::splats::Splats;
 use super::sum::SumPlane;
-use super::{CoverageCounts, Crop, LayerKind, Layout, LightAovSample, PixelSample, Sample, SampleBatch, Taps};
+use super::{
+    CoverageCounts, Crop, Filter, FilterSample, LayerKind, Layout, LightAovSample, PixelSample, Sample, SampleBatch,
+};
 use crate::color::Rgb;
 
 /// How many dropped samples a tile keeps; it counts all of them.
@@ -24,16 +27,18 @@ pub struct DroppedSample {
 }
 
 /// Where a sample of a batch belongs.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct WorldSample {
     /// Index in the batch.
     pub slot: u32,
     /// Index of the pixel (row by row within the tile).
     pub pixel: u32,
+    /// Entry of the pixel within its cell.
+    pub entry: u32,
     /// Index of the sample in its pixel.
     pub sample: u32,
-    /// Weight of the filter.
-    pub weight: f32,
+    /// Where it lies, and the filter's weight.
+    pub place: FilterSample,
 }
 
 impl WorldSample {
@@ -42,7 +47,7 @@ impl WorldSample {
     pub(super) fn weighted<const N: usize>(&self, values: [f32; N]) -> (usize, [f64; N]) {
         let mut terms = [0.0; N];
         for (term, value) in terms.iter_mut().zip(values) {
-            *term = f64::from(self.weight) * f64::from(value);
+            *term = f64::from(self.place.weight) * f64::from(value);
         }
         (self.pixel as usize, terms)
     }
@@ -156,7 +161,7 @@ impl FilmTile {
         if self.layout.signed || !batch.is_bounded() {
             for at in samples {
                 let (pixel, slot) = (at.pixel as usize, at.slot as usize);
-                if self.add(pixel, at.sample, batch.sample(slot), at.weight) {
+                if self.add(pixel, at.sample, batch.sample(slot), at.place.weight) {
                     self.add_moments(pixel, batch.radiance(slot));
                 }
             }
@@ -232,29 +237,94 @@ impl FilmTile {
         true
     }
 
-    /// As [`add`](Self::add), to all pixels that a shared sample reaches, with the weights of
-    /// [`Filter::splat_taps`](super::Filter::splat_taps).
-    /// `splats` collects samples of one cell, and [`flush`](Self::flush) adds them to the tile.
+    /// Where samples of the pixel with this index belong: the first sample of the first slot, at the pixel's centre.
+    #[inline]
+    pub fn world_sample(&self, pixel: usize) -> WorldSample {
+        let entry = self.cells.entry_within_cell(pixel) as u32;
+        WorldSample { slot: 0, pixel: pixel as u32, entry, sample: 0, place: FilterSample::default() }
+    }
+
+    /// As [`add`](Self::add), to all pixels that a shared sample of this filter reaches. `splats` collects samples of
+    /// one cell, and [`flush`](Self::flush) adds them to the tile.
     #[inline]
     pub fn splat<'a>(
         &mut self,
-        pixel: usize,
-        sample: u32,
+        at: &WorldSample,
         value: impl Into<Sample<'a>>,
-        taps: &[Taps; 2],
+        filter: &Filter,
         splats: &mut Splats,
     ) -> bool {
-        let value = value.into();
-        // A sum of as many terms as a pixel has neighbours is to be finite, too.
-        let Some(values) = self.take(pixel, sample, value, Splats::MOST_TERMS) else { return false };
-        let first = self.cells.entry_of(pixel);
-        splats.add(&self.cells, first, taps, &values);
-        if let (Some(coverage), Some(surface)) = (&mut self.coverage, value.surface) {
-            self.cells.for_each_tap(first, taps, |entry, weight| {
-                coverage.add(entry, surface.visible_shape, (f64::from(weight.abs()) * COVERAGE_UNITS).round() as u64);
-            });
+        let mut is_added = false;
+        self.splat_all([(at, value.into())].into_iter(), filter, splats, |_, _| is_added = true);
+        is_added
+    }
+
+    /// As [`splat`](Self::splat) for samples of a batch and one cell, each of which is a [group](Self::add_moments) of
+    /// its own; adds them to the tile.
+    pub fn splat_batch(&mut self, batch: &SampleBatch, samples: &[WorldSample], filter: &Filter, splats: &mut Splats) {
+        let values = samples.iter().map(|at| (at, batch.sample(at.slot as usize)));
+        self.splat_all(values, filter, splats, |tile, at| {
+            tile.add_moments(at.pixel as usize, batch.radiance(at.slot as usize));
+        });
+        if let Some(first) = samples.first() {
+            self.flush(first.pixel as usize, splats);
         }
-        true
+    }
+
+    /// Calls `added` with each sample that was not dropped.
+    #[inline(always)]
+    fn splat_all<'a>(
+        &mut self,
+        samples: impl Iterator<Item = (&'a WorldSample, Sample<'a>)>,
+        filter: &Filter,
+        splats: &mut Splats,
+        added: impl FnMut(&mut Self, &WorldSample),
+    ) {
+        let Some(weights) = filter.shared_weights() else { return };
+        match weights.count() {
+            2 => self.splat_counted::<2>(samples, weights, splats, added),
+            3 => self.splat_counted::<3>(samples, weights, splats, added),
+            4 => self.splat_counted::<4>(samples, weights, splats, added),
+            _ => self.splat_counted::<MAX_TAPS>(samples, weights, splats, added),
+        }
+    }
+
+    /// [`splat_all`](Self::splat_all) of a filter with weights for `N` pixels.
+    #[inline(always)]
+    fn splat_counted<'a, const N: usize>(
+        &mut self,
+        samples: impl Iterator<Item = (&'a WorldSample, Sample<'a>)>,
+        weights: &SharedWeights,
+        splats: &mut Splats,
+        mut added: impl FnMut(&mut Self, &WorldSample),
+    ) {
+        let has_color_alone = !self.layout.beside_color() && !self.layout.signed;
+        let entries = self.cells.entries_of_cell();
+        for (at, value) in samples {
+            let footprint = weights.footprint::<N>(&self.cells, at);
+            let pixel = at.pixel as usize;
+            // A sum of as many terms as a pixel has neighbours is to be finite, too.
+            if has_color_alone {
+                let &PixelSample { radiance, alpha } = value.pixel;
+                if !is_finite(Splats::MOST_TERMS, radiance, alpha) {
+                    self.drop_sample(pixel, at.sample);
+                    continue;
+                }
+                self.samples[pixel] += 1;
+                splats.add_color(entries, &footprint, value.pixel.to_array());
+            } else {
+                let Some(values) = self.take(pixel, at.sample, value, Splats::MOST_TERMS) else { continue };
+                splats.add(entries, &footprint, &values);
+                if let (Some(coverage), Some(surface)) = (&mut self.coverage, value.surface) {
+                    let first = self.cells.cell_of(pixel) * entries;
+                    footprint.for_each(|entry, weight| {
+                        let units = (f64::from(weight.abs()) * COVERAGE_UNITS).round() as u64;
+                        coverage.add(first + entry, surface.visible_shape, units);
+                    });
+                }
+            }
+            added(self, at);
+        }
     }
 
     /// Adds the samples of the cell that has this pixel, and empties `splats`.

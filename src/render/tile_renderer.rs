@@ -81,7 +81,7 @@ impl Default for TileWorkspace {
         let count = (WAVE_SPP * TILE_SIZE * TILE_SIZE) as usize;
         Self {
             samples: CameraBatch::default(),
-            places: vec![FilterSample { offset: Vec2::ZERO, weight: 1.0 }; count],
+            places: vec![FilterSample::default(); count],
             placed: Vec::with_capacity(count),
             terms: Vec::with_capacity(4 * count),
             splats: Splats::default(),
@@ -391,12 +391,7 @@ impl<'a> TileRenderer<'a> {
         for (slot, [dx, dy]) in slots(self.grid.area, origin).map(pixel_of_slot).enumerate() {
             let (x, y) = (origin[0] + dx, origin[1] + dy);
             if active.contains(x, y) {
-                workspace.placed.push(WorldSample {
-                    slot: slot as u32,
-                    pixel: tile.index(x, y) as u32,
-                    sample: 0,
-                    weight: 1.0,
-                });
+                workspace.placed.push(WorldSample { slot: slot as u32, ..tile.world_sample(tile.index(x, y)) });
             }
         }
         let slot_count = slots(self.grid.area, origin).count() as u32;
@@ -409,30 +404,17 @@ impl<'a> TileRenderer<'a> {
             for sample in samples {
                 for placed in &mut workspace.placed {
                     placed.slot = placed.slot % slot_count + (sample - first) * slot_count;
-                    (placed.sample, placed.weight) = (sample, workspace.places[placed.slot as usize].weight);
+                    (placed.sample, placed.place) = (sample, workspace.places[placed.slot as usize]);
                 }
-                self.add_batch(tile, workspace);
+                let TileWorkspace { placed, terms, splats, integrator, .. } = workspace;
+                if self.filter.is_shared() {
+                    tile.splat_batch(&integrator.out, placed, &self.filter, splats);
+                } else {
+                    tile.add_batch(&integrator.out, placed, terms);
+                }
             }
         }
         count
-    }
-
-    /// Adds the placed samples of the batch to the film, each as a group of its own.
-    fn add_batch(&self, tile: &mut FilmTile, workspace: &mut TileWorkspace) {
-        if !self.filter.is_shared() {
-            tile.add_batch(&workspace.integrator.out, &workspace.placed, &mut workspace.terms);
-            return;
-        }
-        for i in 0..workspace.placed.len() {
-            let WorldSample { slot, pixel, sample, .. } = workspace.placed[i];
-            let (slot, pixel) = (slot as usize, pixel as usize);
-            if self.add(tile, pixel, sample, slot, workspace) {
-                tile.add_moments(pixel, workspace.radiance(slot));
-            }
-        }
-        if let Some(first) = workspace.placed.first() {
-            tile.flush(first.pixel as usize, &mut workspace.splats);
-        }
     }
 
     /// Adds a sample of the batch to the film; `false` if it was dropped. Shared samples stay in the splats until these
@@ -448,7 +430,8 @@ impl<'a> TileRenderer<'a> {
     ) -> bool {
         let (value, place) = (workspace.integrator.out.sample(slot), workspace.places[slot]);
         if self.filter.is_shared() {
-            tile.splat(pixel, sample, value, &self.filter.splat_taps(place), &mut workspace.splats)
+            let at = WorldSample { sample, place, ..tile.world_sample(pixel) };
+            tile.splat(&at, value, &self.filter, &mut workspace.splats)
         } else {
             tile.add(pixel, sample, value, place.weight)
         }

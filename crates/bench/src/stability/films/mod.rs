@@ -17,7 +17,7 @@ use crate::color::Rgb;
 use crate::desc::{FilterDesc, FilterSamplesDesc};
 use crate::film::{
     Crop, Film, FilmShape, FilmTile, Filter, Image, LayerKind, LayerSet, LightAovSample, PixelSample, Sample, Splats,
-    SurfaceSample,
+    SurfaceSample, WorldSample,
 };
 use crate::render::Overrides;
 
@@ -67,7 +67,8 @@ impl Filtering {
     fn add(&mut self, tile: &mut FilmTile, pixel: usize, sample: u32, value: &PixelSample) {
         let place = self.filter.sample(self.rng.pair());
         if self.filter.is_shared() {
-            tile.splat(pixel, sample, value, &self.filter.splat_taps(place), &mut self.splats);
+            let at = WorldSample { sample, place, ..tile.world_sample(pixel) };
+            tile.splat(&at, value, &self.filter, &mut self.splats);
             tile.flush(pixel, &mut self.splats);
         } else {
             tile.add(pixel, sample, value, place.weight);
