@@ -14,8 +14,9 @@ use crate::integrator::light_events::LobeWeights;
 use crate::integrator::vertex::HemisphereTest;
 use crate::math::compact::filter_lanes;
 use crate::math::float::ONE_MINUS_EPSILON;
-use crate::math::rows::{BATCH, soa};
-use crate::math::{Ray, RayCone, Vec3, vec3};
+use crate::math::rows::{BATCH, WIDTH, soa, whole_vectors};
+use crate::math::vectorize::vectorize;
+use crate::math::{Frame, Ray, RayCone, Vec3, vec3};
 
 /// The least throughput of both paths.
 const MIN_THROUGHPUT: f32 = 0.01;
@@ -67,14 +68,15 @@ pub(super) fn split(context: &Context, wave: &mut Wave, block: usize) {
     let Some(emitters) = context.emitter_prims.filter(|_| context.config.splitting && !is_pilot) else { return };
     let Wave { vertices, bsdf_rows, branches, cones, light_aovs, .. } = wave;
     sample_reflections(context, vertices, bsdf_rows);
+    if vertices.split_lanes.is_empty() {
+        return;
+    }
+    vectorize!(keep_shown(emitters, vertices));
     for &lane in &vertices.split_lanes {
         let lane = usize::from(lane);
-        let pdf = vertices.splits.pdf[lane];
-        let throughput = vertices.rows.throughput.get(lane);
-        if throughput.max_channel() * pdf.min(1.0 - pdf) < MIN_THROUGHPUT || !may_show(emitters, vertices, lane) {
+        if vertices.splits.is_split[lane] == 0 {
             continue;
         }
-        vertices.splits.is_split[lane] = 1;
         let ray = ray_along(vertices, lane, vertices.splits.wi.get(lane));
         if !is_consistent(vertices, lane, &ray) {
             continue;
@@ -101,6 +103,7 @@ fn sample_reflections(context: &Context, vertices: &mut Vertices, scratch: &mut 
         for (i, &lane) in lanes.iter().enumerate() {
             let (lane, samples) = (usize::from(lane), &scratch.samples);
             let is_reflection = samples.is_valid[i] != 0 && samples.is_transmission[i] == 0;
+            splits.is_split[lane] = 1;
             splits.pdf[lane] = if is_reflection { samples.pdf[i] } else { 0.0 };
             splits.wi.set(lane, samples.wi.get(i));
             splits.value.set(lane, samples.weight.get(i) * samples.pdf[i]);
@@ -125,10 +128,42 @@ fn can_be_split(rows: &VertexRows, lane: usize) -> bool {
     (rows.flags[lane] & GLASS == GLASS) & (rows.path_flags[lane] & path_flags::ANY_NON_SPECULAR == 0)
 }
 
-/// Whether the reflection at a vertex may show an emitter, if all glass is in slabs with the directions of this one.
-fn may_show(emitters: &EmitterPrims, vertices: &Vertices, lane: usize) -> bool {
-    let ray = ray_along(vertices, lane, vertices.splits.leaving.get(lane));
-    emitters.boxes().any(|around| around.may_be_met(ray.origin, ray.direction))
+/// Keeps the vertices whose reflection may show an emitter, if all glass is in slabs with the directions of this one,
+/// and where both paths carry enough.
+#[inline(always)]
+fn keep_shown(emitters: &EmitterPrims, vertices: &mut Vertices) {
+    let Vertices { rows, points, splits, count, .. } = vertices;
+    for first in (0..whole_vectors(*count)).step_by(WIDTH) {
+        let mut is_any = 0;
+        for i in first..first + WIDTH {
+            let pdf = splits.pdf[i];
+            let least = rows.throughput.get(i).max_channel() * pdf.min(1.0 - pdf);
+            splits.is_split[i] &= u32::from(!(least < MIN_THROUGHPUT));
+            is_any |= splits.is_split[i];
+        }
+        if is_any == 0 {
+            continue;
+        }
+        let (mut origins, mut directions) = ([[0.0; WIDTH]; 3], [[0.0; WIDTH]; 3]);
+        for k in 0..WIDTH {
+            let i = first + k;
+            let start = SpawnPoint { p: points.p.get(i), n: rows.n_g.get(i), error: rows.error[i] };
+            let frame = Frame { x: rows.frame_x.get(i), y: rows.frame_y.get(i), z: rows.n.get(i) };
+            let Ray { origin, direction, .. } = start.ray_along(frame.to_world(splits.leaving.get(i)));
+            (origins[0][k], origins[1][k], origins[2][k]) = origin.into();
+            (directions[0][k], directions[1][k], directions[2][k]) = direction.into();
+        }
+        let mut may_show = [0; WIDTH];
+        for around in emitters.boxes() {
+            for (k, may_show) in may_show.iter_mut().enumerate() {
+                let [origin, direction] = [&origins, &directions].map(|rows| vec3(rows[0][k], rows[1][k], rows[2][k]));
+                *may_show |= u32::from(around.may_be_met(origin, direction));
+            }
+        }
+        for (is_split, may_show) in splits.is_split[first..].iter_mut().zip(may_show) {
+            *is_split &= may_show;
+        }
+    }
 }
 
 fn ray_along(vertices: &Vertices, lane: usize, wi: Vec3) -> Ray {
