@@ -141,10 +141,12 @@ const WIDTH: usize = 16;
 #[inline(always)]
 fn draw_by_tables(simd: V4, requests: &SampleIdRows, count: usize, set: u32, numbers: &mut SampleRows) {
     for first in (0..count.min(BATCH)).step_by(WIDTH) {
-        let (mut points, mut scrambles) = ([[0; WIDTH]; 4], [[0; WIDTH]; 4]);
+        let samples = requests.samples[first..].first_chunk().copied().unwrap_or_default();
+        let (mut points, mut scrambles) =
+            ([reversed_by_tables(simd, samples), [0; WIDTH], [0; WIDTH], [0; WIDTH]], [[0; WIDTH]; 4]);
         for i in 0..WIDTH {
             let seeds = SobolSeeds::new(requests.pixels[first + i], set);
-            points[0][i] = owen_scramble(reversed(requests.samples[first + i]), seeds.shuffle);
+            points[0][i] = owen_scramble(points[0][i], seeds.shuffle);
             for (row, scramble) in scrambles.iter_mut().zip(seeds.scrambles) {
                 row[i] = scramble;
             }
@@ -161,13 +163,52 @@ fn draw_by_tables(simd: V4, requests: &SampleIdRows, count: usize, set: u32, num
                 *digit >>= 4;
             }
         }
+        points[0] = reversed_by_tables(simd, points[0]);
         for k in 0..4 {
             for i in 0..WIDTH {
-                let point = if k == 0 { reversed(points[k][i]) } else { points[k][i] };
-                numbers.0[k][first + i] = unit(reversed(owen_scramble(point, scrambles[k][i])));
+                points[k][i] = owen_scramble(points[k][i], scrambles[k][i]);
+            }
+            let bits = reversed_by_tables(simd, points[k]);
+            for i in 0..WIDTH {
+                numbers.0[k][first + i] = unit(bits[i]);
             }
         }
     }
+}
+
+/// A table of 16 bytes for each 16 bytes of a vector.
+const fn repeated(table: [u8; 16]) -> [u8; 4 * WIDTH] {
+    let mut all = [0; 4 * WIDTH];
+    let mut i = 0;
+    while i < all.len() {
+        all[i] = table[i % 16];
+        i += 1;
+    }
+    all
+}
+
+/// `reverse_bits` of each, with lookups in registers.
+#[inline(always)]
+fn reversed_by_tables(simd: V4, n: [u32; WIDTH]) -> [u32; WIDTH] {
+    // The reversed bits of the lower and of the upper half of a byte.
+    const LOWER: [u8; 4 * WIDTH] =
+        repeated([0x00, 0x80, 0x40, 0xc0, 0x20, 0xa0, 0x60, 0xe0, 0x10, 0x90, 0x50, 0xd0, 0x30, 0xb0, 0x70, 0xf0]);
+    const UPPER: [u8; 4 * WIDTH] = repeated([0, 8, 4, 12, 2, 10, 6, 14, 1, 9, 5, 13, 3, 11, 7, 15]);
+    const SWAPPED_BYTES: [u8; 4 * WIDTH] = repeated([3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12]);
+    let swapped = simd.avx512bw._mm512_shuffle_epi8(cast(n), cast(SWAPPED_BYTES));
+    let swapped: [u32; WIDTH] = cast(swapped);
+    let (mut lower, mut upper) = ([0; WIDTH], [0; WIDTH]);
+    for i in 0..WIDTH {
+        lower[i] = swapped[i] & 0x0f0f_0f0f;
+        upper[i] = swapped[i] >> 4 & 0x0f0f_0f0f;
+    }
+    let lower: [u32; WIDTH] = cast(simd.avx512bw._mm512_shuffle_epi8(cast(LOWER), cast(lower)));
+    let upper: [u32; WIDTH] = cast(simd.avx512bw._mm512_shuffle_epi8(cast(UPPER), cast(upper)));
+    let mut reversed = [0; WIDTH];
+    for i in 0..WIDTH {
+        reversed[i] = lower[i] | upper[i];
+    }
+    reversed
 }
 
 /// `reverse_bits` in steps that every vector unit has.
