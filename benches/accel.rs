@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
-use steradian::internal::accel::{self, AccelKind, Accelerator, HitRows};
+use steradian::internal::accel::{self, AccelKind, Accelerator, AnyHitRays, HitRows};
 use steradian::internal::math::RayRows;
 use steradian::internal::math::rows::BATCH;
 use steradian_benches::models::{Model, hare, scans};
@@ -106,7 +106,9 @@ fn queries(criterion: &mut Criterion) {
                 bencher.iter(|| {
                     for (rays, count) in black_box(&blocks) {
                         match set.any {
-                            true => accels[0].1.occluded_rows(rays, *count, &mut occluded, set.coherence),
+                            true => {
+                                accels[0].1.occluded_rows(AnyHitRays::new(rays, *count), &mut occluded, set.coherence)
+                            }
                             false => accels[0].1.intersect_rows(rays, *count, &mut hits, set.coherence),
                         }
                         black_box((&hits, &occluded));

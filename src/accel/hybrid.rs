@@ -6,7 +6,7 @@ use super::bvh::{Bvh, BvhOptions};
 use super::embree::{EmbreeAccel, EmbreeOptions};
 use super::packet::{Hierarchy, PacketHitRows, has_intervals};
 use super::tree::TwoLevel;
-use super::{Accelerator, Coherence, HitRows, intersect_in_rows};
+use super::{Accelerator, AnyHitRays, Coherence, HitRows, intersect_in_rows};
 use crate::error::Result;
 use crate::geometry::{Geometry, Hit, Shape};
 use crate::id::{PrimId, ShapeId};
@@ -209,10 +209,9 @@ impl Accelerator for HybridAccel<'_> {
         }
     }
 
-    fn occluded_rows(&self, rays: &RayRows, count: usize, occluded: &mut [bool; BATCH], coherence: Coherence) {
-        let Some(packets) = &self.packets else {
-            return self.others.occluded_rows(rays, count, occluded, coherence);
-        };
+    fn occluded_rows(&self, rays: AnyHitRays, occluded: &mut [bool; BATCH], coherence: Coherence) {
+        let Some(packets) = &self.packets else { return self.others.occluded_rows(rays, occluded, coherence) };
+        let AnyHitRays { rays, count, targets } = rays;
         let count = count.min(BATCH);
         let mut by_shapes = [false; BATCH];
         packets.occluded(rays, count, &mut by_shapes, |ray| self.occluded_by_shapes(ray));
@@ -220,8 +219,12 @@ impl Accelerator for HybridAccel<'_> {
         for (t_max, is_occluded) in rest.t_max.iter_mut().zip(by_shapes).take(count) {
             *t_max = if is_occluded { -1.0 } else { *t_max };
         }
-        self.others.occluded_rows(&rest, count, occluded, coherence);
+        self.others.occluded_rows(AnyHitRays { rays: &rest, count, targets }, occluded, coherence);
         occluded[..count].iter_mut().zip(by_shapes).for_each(|(occluded, by_shape)| *occluded |= by_shape);
+    }
+
+    fn skips_target(&self, shape: ShapeId) -> bool {
+        self.others.skips_target(shape)
     }
 
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {

@@ -21,9 +21,10 @@ pub use kdtree::KdTreeOptions;
 pub use kind::{AccelKind, UnknownAccel, build};
 pub use linear::LinearAccel;
 pub use packet::PacketBvh;
-pub use rows::HitRows;
+pub use rows::{AnyHitRays, HitRows};
 
 use crate::geometry::Hit;
+use crate::id::ShapeId;
 use crate::math::rows::BATCH;
 use crate::math::{Aabb, Ray, RayRows};
 use inspect::Inspect;
@@ -60,12 +61,18 @@ pub trait Accelerator: Send + Sync {
         }
     }
 
-    /// [`occluded`](Self::occluded) for the first `count` rays, at most [`BATCH`].
-    fn occluded_rows(&self, rays: &RayRows, count: usize, occluded: &mut [bool; BATCH], coherence: Coherence) {
+    /// [`occluded`](Self::occluded) for the rays of a batch.
+    fn occluded_rows(&self, rays: AnyHitRays, occluded: &mut [bool; BATCH], coherence: Coherence) {
         let _ = coherence;
-        for (lane, occluded) in occluded.iter_mut().enumerate().take(count) {
-            *occluded = self.occluded(&rays.get(lane));
+        for (lane, occluded) in occluded.iter_mut().enumerate().take(rays.count) {
+            *occluded = self.occluded(&rays.rays.get(lane));
         }
+    }
+
+    /// Whether [`occluded_rows`](Self::occluded_rows) skips this shape where it is the [target](AnyHitRays::targets).
+    fn skips_target(&self, shape: ShapeId) -> bool {
+        let _ = shape;
+        false
     }
 
     /// [`intersect`](Self::intersect) for each ray, in order, in rows. `hits` is as long as `rays`.
@@ -77,7 +84,7 @@ pub trait Accelerator: Send + Sync {
     fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], coherence: Coherence) {
         let mut found = [false; BATCH];
         for (rays, occluded) in rays.chunks(BATCH).zip(occluded.chunks_mut(BATCH)) {
-            self.occluded_rows(&RayRows::of(rays), rays.len(), &mut found, coherence);
+            self.occluded_rows(AnyHitRays::new(&RayRows::of(rays), rays.len()), &mut found, coherence);
             occluded.copy_from_slice(&found[..occluded.len()]);
         }
     }

@@ -1,8 +1,31 @@
-//! Hits of a batch, as a structure of arrays.
+//! Rays and hits of a batch, as structures of arrays.
 
 use crate::geometry::Hit;
 use crate::id::{InstanceId, PrimId, ShapeId};
-use crate::math::rows::soa;
+use crate::math::RayRows;
+use crate::math::rows::{Row, soa};
+
+/// Rays for any-hit queries.
+#[derive(Clone, Copy)]
+pub struct AnyHitRays<'a> {
+    /// The rays.
+    pub rays: &'a RayRows,
+    /// How many there are, at most [`BATCH`](crate::math::rows::BATCH).
+    pub count: usize,
+    /// By ray: the shape of the world on which it ends and that it hits nowhere before, or [`AnyHitRays::NO_TARGET`].
+    /// Accelerators may skip that shape.
+    pub targets: Option<&'a Row<u32>>,
+}
+
+impl<'a> AnyHitRays<'a> {
+    /// In place of a shape, where all shapes may be hit.
+    pub const NO_TARGET: u32 = u32::MAX;
+
+    /// The first `count` rays, which may hit all shapes.
+    pub fn new(rays: &'a RayRows, count: usize) -> Self {
+        Self { rays, count, targets: None }
+    }
+}
 
 soa! {
     /// Closest hits, as [`Hit`].

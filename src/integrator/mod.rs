@@ -19,6 +19,7 @@ mod regularization;
 mod render_context;
 mod roulette;
 mod shading;
+mod shadow_targets;
 mod strategy;
 mod subsurface;
 mod surface;

@@ -1,6 +1,7 @@
 //! A scene with its accelerator: rays in, surface interactions out.
 
 use super::emitter_prims::EmitterPrims;
+use super::shadow_targets::ShadowTargets;
 use super::subsurface::SubsurfaceShapes;
 use crate::accel::Accelerator;
 use crate::color::Rgb;
@@ -39,6 +40,8 @@ pub struct World<'a> {
     pub(super) subsurface: SubsurfaceShapes,
     /// Emitters whose specular reflections are added without choosing among lobes.
     pub(super) emitter_prims: Option<EmitterPrims>,
+    /// `None` if no shadow ray has a target.
+    pub(super) shadow_targets: Option<ShadowTargets>,
 }
 
 impl<'a> World<'a> {
@@ -55,6 +58,7 @@ impl<'a> World<'a> {
             enclosed_media: super::media::enclosed(scene),
             subsurface: SubsurfaceShapes::new(scene),
             emitter_prims: EmitterPrims::new(scene),
+            shadow_targets: ShadowTargets::new(scene, accel),
         }
     }
 

@@ -32,6 +32,7 @@ pub use tree::LightSampleContext;
 
 use crate::color::Rgb;
 use crate::geometry::{Geometry, SpawnPoint, SurfaceInteraction};
+use crate::id::ShapeId;
 use crate::math::rows::soa;
 use crate::math::{DVec3, Ray, Vec3};
 use crate::texture::Texture;
@@ -128,6 +129,15 @@ impl LightSample {
     }
 }
 
+/// Whether a shadow ray along `toward`, to a point in the direction `wi` where a light has the normal `n`, comes from the
+/// front: neither rounding nor the offset of its start takes it through a flat light or a sphere, seen from outside.
+#[inline(always)]
+pub fn comes_from_front(toward: Vec3, wi: Vec3, n: Vec3) -> bool {
+    /// Of the angle at the light.
+    const LEAST_COSINE: f32 = 1e-3;
+    (wi.dot(n) < 0.0) & (toward.dot(n) < -LEAST_COSINE * toward.length())
+}
+
 impl Light {
     /// Whether no ray ever meets this light.
     pub fn is_delta(&self) -> bool {
@@ -163,6 +173,12 @@ impl Light {
     /// Whether the light stands infinitely far away.
     pub fn is_at_infinity(&self) -> bool {
         matches!(self, Self::Directional(_) | Self::Environment(_))
+    }
+
+    /// The analytic shape on which shadow rays to the light end, and that they hit nowhere before if they
+    /// [come from its front](comes_from_front).
+    pub fn shadow_target(&self, geometry: &Geometry) -> Option<ShapeId> {
+        if let Self::Area(light) = self { light.shadow_target(geometry) } else { None }
     }
 
     /// Light that arrives from a chosen direction, `u` in the unit square; `None` where nothing can arrive.

@@ -9,7 +9,7 @@ use super::agreement::{self, Agreement};
 use super::machine::{memory_in_use, reset_peak_memory};
 use super::{RayKind, RaySet, Spent, Watch, epo, median_and_range};
 use crate::accel::inspect::{Inspect, StructureStats, TraversalCounts};
-use crate::accel::{self, AccelKind, Accelerator, Coherence, HitRows, LinearAccel};
+use crate::accel::{self, AccelKind, Accelerator, AnyHitRays, Coherence, HitRows, LinearAccel};
 use crate::geometry::Geometry;
 use crate::math::rows::BATCH;
 use crate::math::{Ray, RayRows, Vec2};
@@ -469,7 +469,7 @@ fn replay(accel: &dyn Accelerator, rays: &[Ray], mode: Mode, any_hit: bool, thre
         let (mut hits, mut occluded) = (HitRows::default(), [false; BATCH]);
         for (rays, count) in blocks {
             if any_hit {
-                accel.occluded_rows(rays, *count, &mut occluded, coherence);
+                accel.occluded_rows(AnyHitRays::new(rays, *count), &mut occluded, coherence);
                 black_box(&occluded);
             } else {
                 accel.intersect_rows(rays, *count, &mut hits, coherence);

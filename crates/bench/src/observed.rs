@@ -1,7 +1,8 @@
 //! An accelerator whose calls are observed.
 
-use crate::accel::{Accelerator, Coherence, HitRows};
+use crate::accel::{Accelerator, AnyHitRays, Coherence, HitRows};
 use crate::geometry::Hit;
+use crate::id::ShapeId;
 use crate::math::rows::BATCH;
 use crate::math::{Aabb, Ray, RayRows};
 
@@ -53,11 +54,15 @@ impl<O: Observer> Accelerator for Observed<'_, O> {
         self.observer.count(hits.shape[..count].iter().filter(|shape| **shape != HitRows::MISS).count());
     }
 
-    fn occluded_rows(&self, rays: &RayRows, count: usize, occluded: &mut [bool; BATCH], coherence: Coherence) {
-        let listed: Vec<Ray> = (0..count).map(|lane| rays.get(lane)).collect();
+    fn occluded_rows(&self, rays: AnyHitRays, occluded: &mut [bool; BATCH], coherence: Coherence) {
+        let listed: Vec<Ray> = (0..rays.count).map(|lane| rays.rays.get(lane)).collect();
         let call = Call { rays: &listed, any_hit: true, coherence: Some(coherence) };
-        self.observer.observe(&call, &mut || self.inner.occluded_rows(rays, count, occluded, coherence));
-        self.observer.count(occluded[..count].iter().filter(|hit| **hit).count());
+        self.observer.observe(&call, &mut || self.inner.occluded_rows(rays, occluded, coherence));
+        self.observer.count(occluded[..rays.count].iter().filter(|hit| **hit).count());
+    }
+
+    fn skips_target(&self, shape: ShapeId) -> bool {
+        self.inner.skips_target(shape)
     }
 
     fn bounds(&self) -> Aabb {

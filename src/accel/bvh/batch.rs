@@ -14,8 +14,8 @@ use super::best_hits::BestHits;
 use super::coherent::{Occupancy, PacketStack};
 use super::lanes::{SimdIsa, WideRay};
 use super::wide::{Block, Child, ChildKind, Entry, STACK, WIDTH, Wide, WideNode};
-use crate::accel::inspect::ItemKind;
-use crate::accel::tree::{Answers, SlabRay, SlabRows, TwoLevel};
+use crate::accel::inspect::{Item, ItemKind};
+use crate::accel::tree::{Answers, Batch, SlabRay, SlabRows};
 use crate::geometry::{Hit, Shear, ShearRows, TriangleHit, TriangleRay, largest_axis};
 use crate::id::InstanceId;
 use crate::math::compact::set_bits;
@@ -29,13 +29,6 @@ const SLOTS: usize = 32;
 
 /// Lines of the caches that a node fills; a block fills one less.
 const PREFETCHED_LINES: usize = size_of::<WideNode>() / 64;
-
-/// Rays to be traced.
-pub(super) struct Batch<'r, 'a> {
-    pub accel: &'r TwoLevel<'a, Bvh>,
-    pub rays: &'r RayRows,
-    pub count: usize,
-}
 
 /// What is found of rays before they are traced.
 pub(super) struct PreparedRows {
@@ -90,7 +83,7 @@ impl Default for Scratch {
 
 impl Scratch {
     /// Prepares the rays of a batch, none of which has been answered.
-    pub fn prepare(&mut self, wide: &Wide, batch: &Batch<'_, '_>, answers: &mut impl Answers) {
+    pub fn prepare(&mut self, wide: &Wide, batch: &Batch<'_, '_, Bvh>, answers: &mut impl Answers) {
         let rays = batch.rays;
         let count = whole_vectors(batch.count);
         vectorize!(self.prepared.set(wide, batch, count));
@@ -114,7 +107,7 @@ impl Default for PreparedRows {
 
 impl PreparedRows {
     #[inline(always)]
-    fn set(&mut self, wide: &Wide, batch: &Batch<'_, '_>, count: usize) {
+    fn set(&mut self, wide: &Wide, batch: &Batch<'_, '_, Bvh>, count: usize) {
         let rays = batch.rays;
         for lane in 0..count {
             let ray = rays.get(lane);
@@ -206,7 +199,7 @@ struct Space<'r> {
 pub(super) fn trace<'r, L: SimdIsa, const ANY: bool, const INSTANCES: bool>(
     lanes: L,
     wide: &'r Wide,
-    batch: &Batch<'r, '_>,
+    batch: &Batch<'r, '_, Bvh>,
     scratch: &mut Scratch,
     answers: &mut impl Answers,
 ) {
@@ -257,7 +250,7 @@ struct Tracer<'t, 'r, 'a, A, const INSTANCES: bool> {
     world: Space<'r>,
     /// Of each slot, with `INSTANCES`.
     spaces: [Space<'r>; SLOTS],
-    batch: &'t Batch<'r, 'a>,
+    batch: &'t Batch<'r, 'a, Bvh>,
     scratch: &'t mut Scratch,
     answers: &'t mut A,
     any_hit_order: AnyHitOrder,
@@ -327,7 +320,9 @@ impl<'r, A: Answers, const INSTANCES: bool> Tracer<'_, 'r, '_, A, INSTANCES> {
             }
             ChildKind::Items { first, count } => {
                 let items = &wide.items[first as usize..(first + count) as usize];
-                if INSTANCES
+                if ANY && self.is_target(items, slot, lane) {
+                    false
+                } else if INSTANCES
                     && let [item] = items
                     && let ItemKind::Instance(id) = item.kind()
                 {
@@ -350,6 +345,14 @@ impl<'r, A: Answers, const INSTANCES: bool> Tracer<'_, 'r, '_, A, INSTANCES> {
         } else {
             self.advance(slot, lane);
         }
+    }
+
+    /// Whether a leaf has nothing but the shape that a ray ends on.
+    #[inline(always)]
+    fn is_target(&self, items: &[Item], slot: usize, lane: usize) -> bool {
+        let (Some(targets), [item]) = (self.batch.targets, items) else { return false };
+        let is_target = matches!(item.kind(), ItemKind::Prim(shape, _) if shape.0 == targets[lane]);
+        is_target && !self.is_in_object(slot)
     }
 
     /// Goes on to the first node of the hierarchy of an instance. False if no ray gets there.

@@ -7,13 +7,14 @@
 use pulp::Simd;
 use pulp::x86::{V3, V4};
 
-use super::batch::{Batch, PreparedRows, Scratch};
+use super::Bvh;
+use super::batch::{PreparedRows, Scratch};
 use super::best_hits::BestHits;
 use super::lanes::SimdIsa;
 use super::wide::{Block, Child, ChildKind, STACK, WIDTH, Wide, WideNode};
 use crate::accel::inspect::ItemKind;
 use crate::accel::packet::{Vector, load, load_vector, store_f32s};
-use crate::accel::tree::Answers;
+use crate::accel::tree::{Answers, Batch};
 use crate::geometry::{Hit, TriangleHit, TrianglePoints};
 use crate::math::compact::set_bits;
 use crate::math::float::UNIT_ROUNDOFF;
@@ -150,7 +151,7 @@ struct Packet<S: Simd> {
 
 impl<S: PacketIsa> Packet<S> {
     #[inline(always)]
-    fn new(simd: S, wide: &Wide, batch: &Batch<'_, '_>, prepared: &PreparedRows, first: usize) -> Self {
+    fn new(simd: S, wide: &Wide, batch: &Batch<'_, '_, Bvh>, prepared: &PreparedRows, first: usize) -> Self {
         let (s, rays) = (simd, batch.rays);
         let [mut sx, mut sy] = [[0.0; MAX_LANES]; 2];
         let mut reach = wide.bounds.min.abs().max(wide.bounds.max.abs()).max_element();
@@ -293,7 +294,7 @@ fn is_coherent(prepared: &PreparedRows, first: usize, lanes: usize) -> bool {
 pub(super) fn trace<S: PacketIsa>(
     simd: S,
     wide: &Wide,
-    batch: &Batch<'_, '_>,
+    batch: &Batch<'_, '_, Bvh>,
     scratch: &mut Scratch,
     answers: &mut impl Answers,
 ) {
@@ -316,7 +317,7 @@ pub(super) fn trace<S: PacketIsa>(
 struct Tracer<'t, 'r, 'a, S, A> {
     simd: S,
     wide: &'r Wide,
-    batch: &'t Batch<'r, 'a>,
+    batch: &'t Batch<'r, 'a, Bvh>,
     prepared: &'t mut PreparedRows,
     best: BestHits<'t, 'a, A>,
     /// Lanes of the packets at all nodes and leaves.

@@ -18,9 +18,9 @@ use pulp::x86::{V3, V4};
 
 use super::Coherence;
 use super::inspect::NodeInfo;
-use super::tree::{Answers, Counter, Items, Query, Tree, TwoLevel};
-use crate::math::{Aabb, RayRows};
-use batch::{Batch, Scratch};
+use super::tree::{Answers, Batch, Counter, Items, Query, Tree};
+use crate::math::Aabb;
+use batch::Scratch;
 use binary::BinaryTree;
 pub(super) use build::{Binary, BinaryKind, MAX_LEAF, Reference};
 use coherent::PacketIsa;
@@ -62,7 +62,7 @@ impl<C: Counter, const ANY: bool> pulp::NullaryFnOnce for Run<'_, '_, C, ANY> {
 struct PacketRun<'r, 'a, S, A> {
     simd: S,
     wide: &'r Wide,
-    batch: &'r Batch<'r, 'a>,
+    batch: &'r Batch<'r, 'a, Bvh>,
     scratch: &'r mut Scratch,
     answers: &'r mut A,
 }
@@ -79,7 +79,7 @@ impl<S: PacketIsa, A: Answers> pulp::NullaryFnOnce for PacketRun<'_, '_, S, A> {
 struct BatchRun<'r, 'a, A, const ANY: bool> {
     simd: V3,
     wide: &'r Wide,
-    batch: Batch<'r, 'a>,
+    batch: &'r Batch<'r, 'a, Bvh>,
     scratch: &'r mut Scratch,
     answers: &'r mut A,
 }
@@ -90,9 +90,9 @@ impl<A: Answers, const ANY: bool> pulp::NullaryFnOnce for BatchRun<'_, '_, A, AN
     #[inline(always)]
     fn call(self) {
         if self.batch.accel.geometry().instances.is_empty() {
-            batch::trace::<_, ANY, false>(self.simd, self.wide, &self.batch, self.scratch, self.answers);
+            batch::trace::<_, ANY, false>(self.simd, self.wide, self.batch, self.scratch, self.answers);
         } else {
-            batch::trace::<_, ANY, true>(self.simd, self.wide, &self.batch, self.scratch, self.answers);
+            batch::trace::<_, ANY, true>(self.simd, self.wide, self.batch, self.scratch, self.answers);
         }
     }
 }
@@ -160,21 +160,15 @@ impl Tree for Bvh {
         }
     }
 
-    fn trace_rows<const ANY: bool>(
-        accel: &TwoLevel<'_, Self>,
-        rays: &RayRows,
-        count: usize,
-        answers: &mut impl Answers,
-        coherence: Coherence,
-    ) {
-        let Layout::Wide(wide, Some(simd)) = &accel.world().0 else {
-            return accel.trace_one_by_one::<ANY>(rays, count, answers);
+    const SKIPS_TARGETS: bool = true;
+
+    fn trace_rows<const ANY: bool>(batch: &Batch<'_, '_, Self>, answers: &mut impl Answers, coherence: Coherence) {
+        let Layout::Wide(wide, Some(simd)) = &batch.accel.world().0 else {
+            return batch.trace_one_by_one::<ANY>(answers);
         };
         batch::with_scratch(|scratch| {
-            let batch = Batch { accel, rays, count };
-            scratch.prepare(wide, &batch, answers);
-            if coherence == Coherence::Coherent && !ANY && accel.geometry().instances.is_empty() {
-                let batch = &batch;
+            scratch.prepare(wide, batch, answers);
+            if coherence == Coherence::Coherent && !ANY && batch.accel.geometry().instances.is_empty() {
                 if let Some(v4) = V4::try_new() {
                     v4.vectorize(PacketRun { simd: v4, wide, batch, scratch, answers });
                 } else {

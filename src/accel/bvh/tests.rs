@@ -8,13 +8,13 @@ use super::*;
 use crate::accel::inspect::{Inspect, Item, StructureStats};
 use crate::accel::tree::testing::Sequence;
 use crate::accel::tree::{SlabRay, TwoLevel};
-use crate::accel::{Accelerator, Coherence, HitRows};
+use crate::accel::{Accelerator, AnyHitRays, Coherence, HitRows};
 use crate::geometry::{
     Analytic, Geometry, Hit, Mesh, Shape, Sphere, TransformedShape, TriangleHit, TrianglePoints, TriangleRay,
 };
 use crate::id::{PrimId, ShapeId};
 use crate::math::rows::BATCH;
-use crate::math::{Ray, Transform, Vec3};
+use crate::math::{DAffine3, DVec3, Ray, RayRows, Transform, Vec3};
 
 /// Fewer where an interpreter looks for undefined behaviour.
 fn many(n: usize) -> usize {
@@ -200,7 +200,7 @@ fn rays_in_rows_have_the_answers_of_single_rays() {
         let rows = RayRows::of(&rays);
         let (mut found, mut occluded) = (HitRows::default(), [true; BATCH]);
         accel.intersect_rows(&rows, count, &mut found, Coherence::Incoherent);
-        accel.occluded_rows(&rows, count, &mut occluded, Coherence::Coherent);
+        accel.occluded_rows(AnyHitRays::new(&rows, count), &mut occluded, Coherence::Coherent);
         for (lane, ray) in rays.iter().enumerate() {
             let hit = accel.intersect(ray);
             assert_eq!((found.get(lane), occluded[lane]), (hit, hit.is_some()), "{ray:?}");
@@ -208,6 +208,46 @@ fn rays_in_rows_have_the_answers_of_single_rays() {
         }
     }
     assert!(hits > 2_000, "{hits}");
+}
+
+/// Against a test of all shapes but the target.
+#[test]
+#[cfg_attr(any(miri, not(avx2)), ignore = "needs AVX2")]
+fn targets_of_any_hit_rays_are_skipped_and_nothing_else_is() {
+    let mut random = Sequence(17);
+    let mut geometry = soup(&mut random, 60);
+    for i in 1..=12 {
+        let sphere = Analytic::Sphere(Sphere::full(0.4).unwrap());
+        let center = DVec3::from_array([(); 3].map(|()| f64::from(random.next())));
+        let place = Transform::new(DAffine3::from_translation(center)).unwrap();
+        geometry.world.push(ShapeId(i));
+        geometry.shapes.push(Shape::Analytic(TransformedShape::new(sphere, place)));
+    }
+    let accel = TwoLevel::<Bvh>::new(&geometry, &BvhOptions::default(), 1);
+    assert_eq!(geometry.world.iter().filter(|id| accel.skips_target(**id)).count(), 12);
+    let hits = |ray: &Ray, id: ShapeId| {
+        let shape = geometry.shape(id);
+        (0..shape.prim_count()).any(|i| shape.intersect_prim(ray, id, PrimId::new(i)).is_some())
+    };
+    let mut changed = 0;
+    for _ in 0..60 {
+        let rays: Vec<_> = (0..BATCH).map(|_| ray(&mut random)).collect();
+        let targets = [(); BATCH].map(|()| match random.below(14) as u32 {
+            13 => AnyHitRays::NO_TARGET,
+            shape => shape,
+        });
+        let (rows, mut occluded) = (RayRows::of(&rays), [false; BATCH]);
+        let rows = AnyHitRays { targets: Some(&targets), ..AnyHitRays::new(&rows, BATCH) };
+        accel.occluded_rows(rows, &mut occluded, Coherence::Incoherent);
+        for ((ray, target), occluded) in rays.iter().zip(targets).zip(occluded) {
+            // The mesh is no target, for it has several primitives.
+            let others = geometry.world.iter().filter(|id| id.0 == 0 || id.0 != target);
+            let expected = others.into_iter().any(|&id| hits(ray, id));
+            assert_eq!(occluded, expected, "{ray:?} {target}");
+            changed += usize::from(!expected && accel.occluded(ray));
+        }
+    }
+    assert!(changed > 50, "{changed}");
 }
 
 pub(super) fn mesh(triangles: &[[Vec3; 3]]) -> Geometry {

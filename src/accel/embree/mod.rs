@@ -19,7 +19,7 @@ pub use replay::EmbreeReplay;
 
 use std::ffi::c_char;
 
-use super::{Accelerator, Coherence, HitRows};
+use super::{Accelerator, AnyHitRays, Coherence, HitRows};
 use crate::error::Result;
 use crate::geometry::{Geometry, Hit, Shape};
 use crate::id::{InstanceId, PrimId, ShapeId};
@@ -266,7 +266,8 @@ impl Accelerator for EmbreeAccel<'_> {
         }
     }
 
-    fn occluded_rows(&self, rays: &RayRows, count: usize, occluded: &mut [bool; BATCH], coherence: Coherence) {
+    fn occluded_rows(&self, rays: AnyHitRays, occluded: &mut [bool; BATCH], coherence: Coherence) {
+        let AnyHitRays { rays, count, .. } = rays;
         if self.one_by_one {
             return (0..count.min(BATCH)).for_each(|lane| occluded[lane] = self.occluded(&rays.get(lane)));
         }

@@ -12,8 +12,9 @@ mod traverse;
 use super::bvh::Bvh;
 use super::inspect::Inspect;
 use super::tree::TwoLevel;
-use super::{Accelerator, BvhOptions, Coherence, HitRows, intersect_in_rows};
+use super::{Accelerator, AnyHitRays, BvhOptions, Coherence, HitRows, intersect_in_rows};
 use crate::geometry::{Analytic, Geometry, Hit, Shape};
+use crate::id::ShapeId;
 use crate::math::rows::BATCH;
 use crate::math::{Aabb, Ray, RayRows};
 pub(super) use hierarchy::Hierarchy;
@@ -98,9 +99,13 @@ impl Accelerator for PacketBvh<'_> {
         packets.intersect(rays, count.min(BATCH), hits, |ray| self.single.intersect(ray));
     }
 
-    fn occluded_rows(&self, rays: &RayRows, count: usize, occluded: &mut [bool; BATCH], coherence: Coherence) {
-        let Some(packets) = &self.packets else { return self.single.occluded_rows(rays, count, occluded, coherence) };
-        packets.occluded(rays, count.min(BATCH), occluded, |ray| self.single.occluded(ray));
+    fn occluded_rows(&self, rays: AnyHitRays, occluded: &mut [bool; BATCH], coherence: Coherence) {
+        let Some(packets) = &self.packets else { return self.single.occluded_rows(rays, occluded, coherence) };
+        packets.occluded(rays.rays, rays.count.min(BATCH), occluded, |ray| self.single.occluded(ray));
+    }
+
+    fn skips_target(&self, shape: ShapeId) -> bool {
+        self.packets.is_none() && self.single.skips_target(shape)
     }
 
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {

@@ -17,7 +17,7 @@ pub(super) use two_level::TwoLevel;
 use super::inspect::NodeInfo;
 use super::{Coherence, HitRows};
 use crate::geometry::Hit;
-use crate::math::rows::BATCH;
+use crate::math::rows::{BATCH, Row};
 use crate::math::{Aabb, RayRows};
 
 /// Where the answers to the rays of a batch go.
@@ -54,6 +54,15 @@ impl Answers for [bool; BATCH] {
     }
 }
 
+/// Rays to be traced.
+pub(super) struct Batch<'r, 'a, T> {
+    pub accel: &'r TwoLevel<'a, T>,
+    pub rays: &'r RayRows,
+    pub count: usize,
+    /// As [`AnyHitRays::targets`](super::AnyHitRays::targets).
+    pub targets: Option<&'r Row<u32>>,
+}
+
 /// A tree over items.
 pub(super) trait Tree: Send + Sync + Sized {
     /// What can be chosen.
@@ -67,15 +76,12 @@ pub(super) trait Tree: Send + Sync + Sized {
     /// until a visit returns true. An item may be visited twice.
     fn traverse<C: Counter, const ANY: bool>(&self, query: &mut Query<'_, Self, C, ANY>);
 
-    /// Answers the first `count` rays, or whether there are `ANY` hits.
-    fn trace_rows<const ANY: bool>(
-        accel: &TwoLevel<'_, Self>,
-        rays: &RayRows,
-        count: usize,
-        answers: &mut impl Answers,
-        _: Coherence,
-    ) {
-        accel.trace_one_by_one::<ANY>(rays, count, answers);
+    /// Whether [`trace_rows`](Self::trace_rows) skips targets.
+    const SKIPS_TARGETS: bool = false;
+
+    /// Answers rays, or whether there are `ANY` hits.
+    fn trace_rows<const ANY: bool>(batch: &Batch<'_, '_, Self>, answers: &mut impl Answers, _: Coherence) {
+        batch.trace_one_by_one::<ANY>(answers);
     }
 
     /// Bounds of all items; empty if there is none.

@@ -1,9 +1,9 @@
 //! A tree over the world, and one over each object that instances place.
 
-use super::{Answers, Counter, Items, NotCounted, Query, Tree};
+use super::{Answers, Batch, Counter, Items, NotCounted, Query, Tree};
 use crate::accel::inspect::{Inspect, NodeInfo, TraversalCounts};
-use crate::accel::{Accelerator, Coherence, HitRows};
-use crate::geometry::{Geometry, Hit, Instance};
+use crate::accel::{Accelerator, AnyHitRays, Coherence, HitRows};
+use crate::geometry::{Geometry, Hit, Instance, Shape};
 use crate::id::{ObjectId, ShapeId};
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::rows::BATCH;
@@ -16,6 +16,8 @@ pub(in crate::accel) struct TwoLevel<'g, T> {
     objects: Vec<T>,
     bounds: Aabb,
     instances: Option<InstanceRounding>,
+    /// Analytic shapes in the world's tree, in ascending order.
+    analytic_shapes: Vec<ShapeId>,
 }
 
 impl<'g, T: Tree> TwoLevel<'g, T> {
@@ -41,14 +43,25 @@ impl<'g, T: Tree> TwoLevel<'g, T> {
             Ok(pool) => pool.install(build),
             Err(_) => build(),
         };
-        Self { geometry, world, objects, bounds: geometry.bounds(), instances: InstanceRounding::of(geometry) }
+        let is_analytic = |id: &ShapeId| matches!(geometry.shape(*id), Shape::Analytic(_));
+        let mut analytic_shapes: Vec<ShapeId> = shapes.iter().copied().filter(is_analytic).collect();
+        analytic_shapes.sort_unstable();
+        let (bounds, instances) = (geometry.bounds(), InstanceRounding::of(geometry));
+        Self { geometry, world, objects, bounds, instances, analytic_shapes }
     }
 
     /// A tree made by `build` over the world of a geometry without instances.
     #[cfg(test)]
     pub fn over_world(geometry: &'g Geometry, build: impl Fn(&Items<'_>) -> T) -> Self {
         let world = build(&Items::of_world(geometry, &geometry.world, &[]));
-        Self { geometry, world, objects: Vec::new(), bounds: geometry.bounds(), instances: None }
+        Self {
+            geometry,
+            world,
+            objects: Vec::new(),
+            bounds: geometry.bounds(),
+            instances: None,
+            analytic_shapes: Vec::new(),
+        }
     }
 
     /// What all trees are over.
@@ -74,13 +87,6 @@ impl<'g, T: Tree> TwoLevel<'g, T> {
         &self.world
     }
 
-    /// As [`Tree::trace_rows`], one ray after the other.
-    pub fn trace_one_by_one<const ANY: bool>(&self, rays: &RayRows, count: usize, answers: &mut impl Answers) {
-        for lane in 0..count {
-            answers.set(lane, self.query::<_, ANY>(&rays.get(lane), &mut NotCounted));
-        }
-    }
-
     #[inline(always)]
     fn query<C: Counter, const ANY: bool>(&self, ray: &Ray, counter: &mut C) -> Option<Hit> {
         if !ray.is_valid() {
@@ -89,6 +95,15 @@ impl<'g, T: Tree> TwoLevel<'g, T> {
         let mut query: Query<'_, T, C, ANY> = Query::new(self, ray, counter);
         self.world.traverse(&mut query);
         query.best
+    }
+}
+
+impl<T: Tree> Batch<'_, '_, T> {
+    /// As [`Tree::trace_rows`], one ray after the other.
+    pub fn trace_one_by_one<const ANY: bool>(&self, answers: &mut impl Answers) {
+        for lane in 0..self.count {
+            answers.set(lane, self.accel.query::<_, ANY>(&self.rays.get(lane), &mut NotCounted));
+        }
     }
 }
 
@@ -142,11 +157,18 @@ impl<T: Tree> Accelerator for TwoLevel<'_, T> {
     }
 
     fn intersect_rows(&self, rays: &RayRows, count: usize, hits: &mut HitRows, coherence: Coherence) {
-        T::trace_rows::<false>(self, rays, count.min(BATCH), hits, coherence);
+        let batch = Batch { accel: self, rays, count: count.min(BATCH), targets: None };
+        T::trace_rows::<false>(&batch, hits, coherence);
     }
 
-    fn occluded_rows(&self, rays: &RayRows, count: usize, occluded: &mut [bool; BATCH], coherence: Coherence) {
-        T::trace_rows::<true>(self, rays, count.min(BATCH), occluded, coherence);
+    fn occluded_rows(&self, rays: AnyHitRays, occluded: &mut [bool; BATCH], coherence: Coherence) {
+        let AnyHitRays { rays, count, targets } = rays;
+        let batch = Batch { accel: self, rays, count: count.min(BATCH), targets };
+        T::trace_rows::<true>(&batch, occluded, coherence);
+    }
+
+    fn skips_target(&self, shape: ShapeId) -> bool {
+        T::SKIPS_TARGETS && self.analytic_shapes.binary_search(&shape).is_ok()
     }
 
     fn bounds(&self) -> Aabb {

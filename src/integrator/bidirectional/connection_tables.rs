@@ -8,7 +8,7 @@ use std::f32::consts::FRAC_1_PI;
 use rayon::prelude::*;
 
 use super::{LightVertex, bounded, squared};
-use crate::accel::{Accelerator, Coherence};
+use crate::accel::{Accelerator, AnyHitRays, Coherence};
 use crate::geometry::SpawnPoint;
 use crate::integrator::octant_grid::{OctantGrid, cell_count};
 use crate::math::prefetch::prefetch;
@@ -290,7 +290,7 @@ fn mean_squares(
             found[count] = (cluster, contribution);
             count += 1;
         }
-        accel.occluded_rows(&rays, count, &mut occluded, Coherence::Incoherent);
+        accel.occluded_rows(AnyHitRays::new(&rays, count), &mut occluded, Coherence::Incoherent);
         for (&(cluster, contribution), _) in found[..count].iter().zip(&occluded).filter(|(_, occluded)| !**occluded) {
             squares[cluster] += contribution * contribution / pairs as f32;
         }

@@ -3,7 +3,7 @@
 
 use super::Context;
 use super::block::{Vertices, spawn};
-use crate::accel::Coherence;
+use crate::accel::{AnyHitRays, Coherence};
 use crate::geometry::SurfaceInteraction;
 use crate::integrator::shading::terminator_start;
 use crate::math::rows::{BATCH, Row};
@@ -45,7 +45,8 @@ pub(super) fn offset(
         return 0;
     }
     let mut occluded = [false; BATCH];
-    context.world.accel.occluded_rows(rays, lanes.len(), &mut occluded, Coherence::Incoherent);
+    let rays = AnyHitRays::new(rays, lanes.len());
+    context.world.accel.occluded_rows(rays, &mut occluded, Coherence::Incoherent);
     for ((&lane, start), _) in lanes.iter().zip(starts.iter()).zip(&occluded).filter(|(_, occluded)| !**occluded) {
         respawn(vertices, usize::from(lane), start);
         status(vertices)[usize::from(lane)] = spawn::SPAWNED;

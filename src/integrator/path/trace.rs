@@ -3,7 +3,7 @@
 use super::Context;
 use super::radiance::Output;
 use super::wave::Wave;
-use crate::accel::Coherence;
+use crate::accel::{AnyHitRays, Coherence};
 use crate::integrator::RayCounts;
 use crate::math::rows::BATCH;
 
@@ -42,7 +42,8 @@ pub(super) fn shadow(context: &Context, wave: &mut Wave, out: &mut Output, count
         let count = BATCH.min(shadows.count - first);
         // In media they have been traced already.
         if !context.scene.features.participating_media {
-            context.world.accel.occluded_rows(rays, count, &mut occluded, coherence);
+            let rays = AnyHitRays { rays, count, targets: shadows.targets.get(block) };
+            context.world.accel.occluded_rows(rays, &mut occluded, coherence);
         }
         let blocked = occluded[..count].iter().filter(|&&occluded| occluded).count();
         wave.continuations.count_unoccluded(count - blocked);

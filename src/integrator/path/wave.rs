@@ -15,7 +15,7 @@ use super::specular_direct::SpecularRows;
 use super::splitting::Branch;
 use super::terminator::TerminatorRays;
 use super::{Context, dimensions};
-use crate::accel::HitRows;
+use crate::accel::{AnyHitRays, HitRows};
 use crate::bsdf::{BsdfEvalRows, BsdfQueryRows, BsdfSampleRows};
 use crate::color::{Rgb, RgbRows};
 use crate::id::LightId;
@@ -110,6 +110,8 @@ pub(super) struct ShadowQueue {
     pub count: usize,
     pub rays: Vec<RayRows>,
     pub rows: Vec<ShadowRows>,
+    /// As [`AnyHitRays::targets`], where the accelerator skips them.
+    pub targets: Vec<Row<u32>>,
 }
 
 /// Appends the chosen `$lanes` of rows, and of rows of vectors, to columns of a block and the next.
@@ -326,7 +328,7 @@ impl Wave {
         if context.config.clamp.is_finite() {
             self.vertices.clamp_direct(context);
         }
-        let Vertices { count, rows, direct, .. } = &self.vertices;
+        let Vertices { count, rows, direct, light_samples, .. } = &self.vertices;
         let lanes = Compaction::equal(&direct.status, spawn::SPAWNED, *count);
         if context.config.needs_light_aovs() {
             for lane in (0..BATCH).filter(|&lane| lanes.contains(lane)) {
@@ -354,6 +356,15 @@ impl Wave {
         while shadows.rays.len() < to + 2 {
             shadows.rays.push(RayRows::default());
             shadows.rows.push(ShadowRows::default());
+        }
+        if let Some(targets) = &context.world.shadow_targets {
+            shadows.targets.resize(shadows.rays.len(), [AnyHitRays::NO_TARGET; BATCH]);
+            let (column, next_column) = pair(&mut shadows.targets, to);
+            // Of connections, no light is sampled.
+            let count = if scatterings == 0 { *count } else { 0 };
+            lanes.append(&targets.of_samples(light_samples, &direct.shadow_direction, count), column, next_column, at);
+        } else {
+            shadows.targets.clear();
         }
         let (rays, next_rays) = pair(&mut shadows.rays, to);
         append!(lanes, at, rays, next_rays, { direct.shadow_end => t_max, rows.time => time, }, {

@@ -4,7 +4,9 @@ use super::tests::{assert_power_flows_out, assert_samples_are_hits, irradiance, 
 use super::*;
 use crate::geometry::{Disk, Frustum, Quad, Sphere};
 use crate::light::queue::{LightSampleOutput, SampleGroup};
-use crate::light::{Light, LightContext, LightQueries, LightSampleContext, LightSampleRows, LightSet, MisCompensation};
+use crate::light::{
+    Light, LightContext, LightQueries, LightSampleContext, LightSampleRows, LightSet, MisCompensation, comes_from_front,
+};
 use crate::math::rows::{BATCH, DVec3Rows, Vec3Rows};
 use crate::math::{DAffine3, DMat3, Rng, Transform};
 use crate::sampling::SampleRows;
@@ -86,6 +88,50 @@ fn a_quad_light_gives_lamberts_irradiance() {
     assert!(
         light.sample(&geometry, &[], &LightSampleContext::from_any_side(DVec3::new(0.0, 0.0, 2.0)), [0.5; 2]).is_none()
     );
+}
+
+/// No sample that is seen from the front has its own shape in the way, from near and far, within and without, from the shape itself, towards
+/// either side.
+#[test]
+fn shapes_that_shadow_rays_may_skip_do_not_hide_their_samples() {
+    let mut rng = Rng::new(11);
+    let (mut skipped, mut count) = (Vec::new(), 0);
+    for (name, shape) in partial().into_iter().chain([("sphere", sphere())]) {
+        for (scale, is_reversed) in [([1.0; 3], false), ([-2.0; 3], true), ([1.0, 1.7, 0.6], false)] {
+            let mut geometry = place(shape.clone(), skew(scale));
+            if let Shape::Analytic(placed) = &mut geometry.shapes[0] {
+                placed.reverse_normal = is_reversed;
+            }
+            for emission in [WHITE, TWO_SIDED] {
+                let light = light(&geometry, emission);
+                let Some(id) = light.shadow_target(&geometry) else { continue };
+                skipped.push(name);
+                for k in 0..2_000 {
+                    let distance = 0.03 * 10f64.powi(k % 7);
+                    let mut start = DVec3::new(0.4, 1.0, -0.7) + rng.direction() * distance;
+                    let mut n = rng.direction().as_vec3();
+                    let mut u = || [rng.unit_f32(), rng.unit_f32()];
+                    if let (6, Shape::Analytic(placed)) = (k % 7, geometry.shape(id)) {
+                        let own = placed.sample_area(u());
+                        (start, n) = (own.p, own.n);
+                    }
+                    let from = SpawnPoint { p: start, n, error: 1e-6 };
+                    let context = LightSampleContext::from_any_side(start);
+                    let Some(sample) = light.sample(&geometry, &[], &context, u()) else { continue };
+                    let ShadowTarget::Point(end) = sample.target else { panic!("{name} is at infinity") };
+                    let ray = from.ray_to(&end);
+                    if !comes_from_front(ray.direction, sample.wi, end.n) {
+                        continue;
+                    }
+                    count += 1;
+                    assert!(geometry.shape(id).intersect_prim(&ray, id, PrimId(0)).is_none(), "{name} {ray:?}");
+                }
+            }
+        }
+    }
+    skipped.dedup();
+    assert!(count > 15_000, "{count}");
+    assert_eq!(skipped, ["disk", "ring sector", "quad", "sphere"]);
 }
 
 #[test]

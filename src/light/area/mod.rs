@@ -292,6 +292,14 @@ impl AreaLight {
         }
     }
 
+    /// As [`Light::shadow_target`](super::Light::shadow_target): a shape that is flat, or a whole sphere, of which only
+    /// points that are seen are sampled.
+    pub(super) fn shadow_target(&self, geometry: &Geometry) -> Option<ShapeId> {
+        let Shape::Analytic(placed) = geometry.shape(self.shape) else { return None };
+        let is_flat = matches!(placed.shape, Analytic::Quad(_) | Analytic::Disk(_));
+        (is_flat || matches!(self.form, EmitterShape::Sphere(_))).then_some(self.shape)
+    }
+
     /// With which lights it is sampled for many vertices at once.
     pub(super) fn sample_group(&self) -> SampleGroup {
         match &self.form {

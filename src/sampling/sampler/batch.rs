@@ -169,8 +169,8 @@ fn draw_by_tables(simd: V4, requests: &SampleIdRows, count: usize, set: u32, num
                 points[k][i] = owen_scramble(points[k][i], scrambles[k][i]);
             }
             let bits = reversed_by_tables(simd, points[k]);
-            for i in 0..WIDTH {
-                numbers.0[k][first + i] = unit(bits[i]);
+            for (number, bits) in numbers.0[k][first..first + WIDTH].iter_mut().zip(bits) {
+                *number = unit(bits);
             }
         }
     }
@@ -195,8 +195,7 @@ fn reversed_by_tables(simd: V4, n: [u32; WIDTH]) -> [u32; WIDTH] {
         repeated([0x00, 0x80, 0x40, 0xc0, 0x20, 0xa0, 0x60, 0xe0, 0x10, 0x90, 0x50, 0xd0, 0x30, 0xb0, 0x70, 0xf0]);
     const UPPER: [u8; 4 * WIDTH] = repeated([0, 8, 4, 12, 2, 10, 6, 14, 1, 9, 5, 13, 3, 11, 7, 15]);
     const SWAPPED_BYTES: [u8; 4 * WIDTH] = repeated([3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12]);
-    let swapped = simd.avx512bw._mm512_shuffle_epi8(cast(n), cast(SWAPPED_BYTES));
-    let swapped: [u32; WIDTH] = cast(swapped);
+    let swapped: [u32; WIDTH] = cast(simd.avx512bw._mm512_shuffle_epi8(cast(n), cast(SWAPPED_BYTES)));
     let (mut lower, mut upper) = ([0; WIDTH], [0; WIDTH]);
     for i in 0..WIDTH {
         lower[i] = swapped[i] & 0x0f0f_0f0f;
