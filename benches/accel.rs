@@ -107,7 +107,7 @@ fn queries(criterion: &mut Criterion) {
                     for (rays, count) in black_box(&blocks) {
                         match set.any {
                             true => {
-                                accels[0].1.occluded_rows(AnyHitRays::new(rays, *count), &mut occluded, set.coherence)
+                                accels[0].1.occluded_rows(AnyHitRays::new(rays, *count), &mut occluded, set.coherence);
                             }
                             false => accels[0].1.intersect_rows(rays, *count, &mut hits, set.coherence),
                         }
