@@ -1,5 +1,5 @@
-use super::super::shared_weights::OFFSET_CELLS;
 use super::*;
+use crate::film::shared_weights::OFFSET_CELLS;
 
 /// Integral of one axis over `[a, b]`.
 fn integral(desc: &FilterDesc, a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {

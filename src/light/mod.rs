@@ -129,8 +129,8 @@ impl LightSample {
     }
 }
 
-/// Whether a shadow ray along `toward`, to a point in the direction `wi` where a light has the normal `n`, comes from the
-/// front: neither rounding nor the offset of its start takes it through a flat light or a sphere, seen from outside.
+/// Whether a shadow ray along `toward`, to a point in the direction `wi` where a light has the normal `n`, comes from
+/// the front: neither rounding nor the offset of its start takes it through a flat light, or a sphere from outside.
 #[inline(always)]
 pub fn comes_from_front(toward: Vec3, wi: Vec3, n: Vec3) -> bool {
     /// Of the angle at the light.

@@ -90,8 +90,8 @@ fn a_quad_light_gives_lamberts_irradiance() {
     );
 }
 
-/// No sample that is seen from the front has its own shape in the way, from near and far, within and without, from the shape itself, towards
-/// either side.
+/// No sample that is seen from the front has its own shape in the way, from near and far, within and without, from the
+/// shape itself, towards either side.
 #[test]
 fn shapes_that_shadow_rays_may_skip_do_not_hide_their_samples() {
     let mut rng = Rng::new(11);
