@@ -211,7 +211,7 @@ impl Accelerator for HybridAccel<'_> {
 
     fn occluded_rows(&self, rays: AnyHitRays, occluded: &mut [bool; BATCH], coherence: Coherence) {
         let Some(packets) = &self.packets else { return self.others.occluded_rows(rays, occluded, coherence) };
-        let AnyHitRays { rays, count, targets } = rays;
+        let AnyHitRays { rays, count, end_shapes } = rays;
         let count = count.min(BATCH);
         let mut by_shapes = [false; BATCH];
         packets.occluded(rays, count, &mut by_shapes, |ray| self.occluded_by_shapes(ray));
@@ -219,12 +219,12 @@ impl Accelerator for HybridAccel<'_> {
         for (t_max, is_occluded) in rest.t_max.iter_mut().zip(by_shapes).take(count) {
             *t_max = if is_occluded { -1.0 } else { *t_max };
         }
-        self.others.occluded_rows(AnyHitRays { rays: &rest, count, targets }, occluded, coherence);
+        self.others.occluded_rows(AnyHitRays { rays: &rest, count, end_shapes }, occluded, coherence);
         occluded[..count].iter_mut().zip(by_shapes).for_each(|(occluded, by_shape)| *occluded |= by_shape);
     }
 
-    fn skips_target(&self, shape: ShapeId) -> bool {
-        self.others.skips_target(shape)
+    fn skips_end_shape(&self, shape: ShapeId) -> bool {
+        self.others.skips_end_shape(shape)
     }
 
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {

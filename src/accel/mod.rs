@@ -69,8 +69,8 @@ pub trait Accelerator: Send + Sync {
         }
     }
 
-    /// Whether [`occluded_rows`](Self::occluded_rows) skips this shape where it is the [target](AnyHitRays::targets).
-    fn skips_target(&self, shape: ShapeId) -> bool {
+    /// Whether [`occluded_rows`](Self::occluded_rows) skips this shape where a [ray ends on it](AnyHitRays::end_shapes).
+    fn skips_end_shape(&self, shape: ShapeId) -> bool {
         let _ = shape;
         false
     }

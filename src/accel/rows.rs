@@ -12,18 +12,18 @@ pub struct AnyHitRays<'a> {
     pub rays: &'a RayRows,
     /// How many there are, at most [`BATCH`](crate::math::rows::BATCH).
     pub count: usize,
-    /// By ray: the shape of the world on which it ends and that it hits nowhere before, or [`AnyHitRays::NO_TARGET`].
+    /// By ray: the shape of the world on which it ends and that it hits nowhere before, or [`AnyHitRays::NO_SHAPE`].
     /// Accelerators may skip that shape.
-    pub targets: Option<&'a Row<u32>>,
+    pub end_shapes: Option<&'a Row<u32>>,
 }
 
 impl<'a> AnyHitRays<'a> {
     /// In place of a shape, where all shapes may be hit.
-    pub const NO_TARGET: u32 = u32::MAX;
+    pub const NO_SHAPE: u32 = u32::MAX;
 
     /// The first `count` rays, which may hit all shapes.
     pub fn new(rays: &'a RayRows, count: usize) -> Self {
-        Self { rays, count, targets: None }
+        Self { rays, count, end_shapes: None }
     }
 }
 

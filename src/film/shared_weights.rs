@@ -38,7 +38,7 @@ pub(super) struct Taps<const N: usize> {
 }
 
 /// The entries of a cell that a shared sample reaches.
-pub(super) struct Footprint<const N: usize> {
+pub(super) struct Splat<const N: usize> {
     /// The first entry of the first row.
     first: usize,
     /// Entries from one row to the next.
@@ -106,15 +106,15 @@ impl SharedWeights {
 
     /// The entries that a sample reaches; `N` is [`count`](Self::count).
     #[inline(always)]
-    pub fn footprint<const N: usize>(&self, cells: &Cells, at: &WorldSample) -> Footprint<N> {
+    pub fn splat<const N: usize>(&self, cells: &Cells, at: &WorldSample) -> Splat<N> {
         let (columns, rows) = (self.taps::<N>(at.place.offset.x), self.taps::<N>(at.place.offset.y));
         let stride = cells.stride();
         let first = at.entry as isize + rows.first as isize * stride as isize + columns.first as isize;
-        Footprint { first: first as usize, stride, columns, rows }
+        Splat { first: first as usize, stride, columns, rows }
     }
 }
 
-impl<const N: usize> Footprint<N> {
+impl<const N: usize> Splat<N> {
     /// Calls `f` with every entry and its weight.
     #[inline(always)]
     pub fn for_each(&self, mut f: impl FnMut(usize, f32)) {

@@ -2,7 +2,7 @@
 
 use super::accumulator::{Accumulator, Values};
 use super::cells::Cells;
-use super::shared_weights::Footprint;
+use super::shared_weights::Splat;
 use super::sum::SumPlane;
 use crate::color::Rgb;
 
@@ -22,20 +22,20 @@ impl Splats {
 
     /// Adds the radiance and alpha of a sample of a cell with this many entries.
     #[inline(always)]
-    pub(super) fn add_color<const N: usize>(&mut self, entries: usize, footprint: &Footprint<N>, color: [f32; 4]) {
+    pub(super) fn add_color<const N: usize>(&mut self, entries: usize, splat: &Splat<N>, color: [f32; 4]) {
         if self.color.is_empty() {
             self.color.resize(entries, [0.0; 8]);
         }
         let [r, g, b, a] = color;
-        footprint.add(&mut self.color, [r, g, b, a, 1.0, 0.0, 0.0, 0.0]);
+        splat.add(&mut self.color, [r, g, b, a, 1.0, 0.0, 0.0, 0.0]);
     }
 
     /// Adds all values of a sample.
     #[inline(always)]
-    pub(super) fn add<const N: usize>(&mut self, entries: usize, footprint: &Footprint<N>, values: &Values) {
-        self.add_color(entries, footprint, values.color);
+    pub(super) fn add<const N: usize>(&mut self, entries: usize, splat: &Splat<N>, values: &Values) {
+        self.add_color(entries, splat, values.color);
         values.for_each_average(|k, Rgb { r, g, b }| {
-            footprint.add(plane(&mut self.averages, k, entries), [r, g, b, 0.0]);
+            splat.add(plane(&mut self.averages, k, entries), [r, g, b, 0.0]);
         });
     }
 

@@ -301,7 +301,7 @@ impl FilmTile {
         let has_color_alone = !self.layout.beside_color() && !self.layout.signed;
         let entries = self.cells.entries_of_cell();
         for (at, value) in samples {
-            let footprint = weights.footprint::<N>(&self.cells, at);
+            let splat = weights.splat::<N>(&self.cells, at);
             let pixel = at.pixel as usize;
             // A sum of as many terms as a pixel has neighbours is to be finite, too.
             if has_color_alone {
@@ -311,13 +311,13 @@ impl FilmTile {
                     continue;
                 }
                 self.samples[pixel] += 1;
-                splats.add_color(entries, &footprint, value.pixel.to_array());
+                splats.add_color(entries, &splat, value.pixel.to_array());
             } else {
                 let Some(values) = self.take(pixel, at.sample, value, Splats::MOST_TERMS) else { continue };
-                splats.add(entries, &footprint, &values);
+                splats.add(entries, &splat, &values);
                 if let (Some(coverage), Some(surface)) = (&mut self.coverage, value.surface) {
                     let first = self.cells.cell_of(pixel) * entries;
-                    footprint.for_each(|entry, weight| {
+                    splat.for_each(|entry, weight| {
                         let units = (f64::from(weight.abs()) * COVERAGE_UNITS).round() as u64;
                         coverage.add(first + entry, surface.visible_shape, units);
                     });

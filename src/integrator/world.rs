@@ -1,7 +1,7 @@
 //! A scene with its accelerator: rays in, surface interactions out.
 
 use super::emitter_prims::EmitterPrims;
-use super::shadow_targets::ShadowTargets;
+use super::end_shapes::EndShapes;
 use super::subsurface::SubsurfaceShapes;
 use crate::accel::Accelerator;
 use crate::color::Rgb;
@@ -40,8 +40,8 @@ pub struct World<'a> {
     pub(super) subsurface: SubsurfaceShapes,
     /// Emitters whose specular reflections are added without choosing among lobes.
     pub(super) emitter_prims: Option<EmitterPrims>,
-    /// `None` if no shadow ray has a target.
-    pub(super) shadow_targets: Option<ShadowTargets>,
+    /// `None` if the accelerator skips none.
+    pub(super) end_shapes: Option<EndShapes>,
 }
 
 impl<'a> World<'a> {
@@ -58,7 +58,7 @@ impl<'a> World<'a> {
             enclosed_media: super::media::enclosed(scene),
             subsurface: SubsurfaceShapes::new(scene),
             emitter_prims: EmitterPrims::new(scene),
-            shadow_targets: ShadowTargets::new(scene, accel),
+            end_shapes: EndShapes::new(scene, accel),
         }
     }
 

@@ -177,8 +177,8 @@ impl Light {
 
     /// The analytic shape on which shadow rays to the light end, and that they hit nowhere before if they
     /// [come from its front](comes_from_front).
-    pub fn shadow_target(&self, geometry: &Geometry) -> Option<ShapeId> {
-        if let Self::Area(light) = self { light.shadow_target(geometry) } else { None }
+    pub fn end_shape(&self, geometry: &Geometry) -> Option<ShapeId> {
+        if let Self::Area(light) = self { light.end_shape(geometry) } else { None }
     }
 
     /// Light that arrives from a chosen direction, `u` in the unit square; `None` where nothing can arrive.

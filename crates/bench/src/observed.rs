@@ -61,8 +61,8 @@ impl<O: Observer> Accelerator for Observed<'_, O> {
         self.observer.count(occluded[..rays.count].iter().filter(|hit| **hit).count());
     }
 
-    fn skips_target(&self, shape: ShapeId) -> bool {
-        self.inner.skips_target(shape)
+    fn skips_end_shape(&self, shape: ShapeId) -> bool {
+        self.inner.skips_end_shape(shape)
     }
 
     fn bounds(&self) -> Aabb {

@@ -320,7 +320,7 @@ impl<'r, A: Answers, const INSTANCES: bool> Tracer<'_, 'r, '_, A, INSTANCES> {
             }
             ChildKind::Items { first, count } => {
                 let items = &wide.items[first as usize..(first + count) as usize];
-                if ANY && self.is_target(items, slot, lane) {
+                if ANY && self.is_end_shape(items, slot, lane) {
                     false
                 } else if INSTANCES
                     && let [item] = items
@@ -349,10 +349,10 @@ impl<'r, A: Answers, const INSTANCES: bool> Tracer<'_, 'r, '_, A, INSTANCES> {
 
     /// Whether a leaf has nothing but the shape that a ray ends on.
     #[inline(always)]
-    fn is_target(&self, items: &[Item], slot: usize, lane: usize) -> bool {
-        let (Some(targets), [item]) = (self.batch.targets, items) else { return false };
-        let is_target = matches!(item.kind(), ItemKind::Prim(shape, _) if shape.0 == targets[lane]);
-        is_target && !self.is_in_object(slot)
+    fn is_end_shape(&self, items: &[Item], slot: usize, lane: usize) -> bool {
+        let (Some(end_shapes), [item]) = (self.batch.end_shapes, items) else { return false };
+        let is_end_shape = matches!(item.kind(), ItemKind::Prim(shape, _) if shape.0 == end_shapes[lane]);
+        is_end_shape && !self.is_in_object(slot)
     }
 
     /// Goes on to the first node of the hierarchy of an instance. False if no ray gets there.

@@ -160,7 +160,7 @@ impl Tree for Bvh {
         }
     }
 
-    const SKIPS_TARGETS: bool = true;
+    const SKIPS_END_SHAPES: bool = true;
 
     fn trace_rows<const ANY: bool>(batch: &Batch<'_, '_, Self>, answers: &mut impl Answers, coherence: Coherence) {
         let Layout::Wide(wide, Some(simd)) = &batch.accel.world().0 else {

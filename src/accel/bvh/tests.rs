@@ -210,10 +210,10 @@ fn rays_in_rows_have_the_answers_of_single_rays() {
     assert!(hits > 2_000, "{hits}");
 }
 
-/// Against a test of all shapes but the target.
+/// Against a test of all shapes but that one.
 #[test]
 #[cfg_attr(any(miri, not(avx2)), ignore = "needs AVX2")]
-fn targets_of_any_hit_rays_are_skipped_and_nothing_else_is() {
+fn end_shapes_of_any_hit_rays_are_skipped_and_nothing_else_is() {
     let mut random = Sequence(17);
     let mut geometry = soup(&mut random, 60);
     for i in 1..=12 {
@@ -224,7 +224,7 @@ fn targets_of_any_hit_rays_are_skipped_and_nothing_else_is() {
         geometry.shapes.push(Shape::Analytic(TransformedShape::new(sphere, place)));
     }
     let accel = TwoLevel::<Bvh>::new(&geometry, &BvhOptions::default(), 1);
-    assert_eq!(geometry.world.iter().filter(|id| accel.skips_target(**id)).count(), 12);
+    assert_eq!(geometry.world.iter().filter(|id| accel.skips_end_shape(**id)).count(), 12);
     let hits = |ray: &Ray, id: ShapeId| {
         let shape = geometry.shape(id);
         (0..shape.prim_count()).any(|i| shape.intersect_prim(ray, id, PrimId::new(i)).is_some())
@@ -232,18 +232,18 @@ fn targets_of_any_hit_rays_are_skipped_and_nothing_else_is() {
     let mut changed = 0;
     for _ in 0..60 {
         let rays: Vec<_> = (0..BATCH).map(|_| ray(&mut random)).collect();
-        let targets = [(); BATCH].map(|()| match random.below(14) as u32 {
-            13 => AnyHitRays::NO_TARGET,
+        let end_shapes = [(); BATCH].map(|()| match random.below(14) as u32 {
+            13 => AnyHitRays::NO_SHAPE,
             shape => shape,
         });
         let (rows, mut occluded) = (RayRows::of(&rays), [false; BATCH]);
-        let rows = AnyHitRays { targets: Some(&targets), ..AnyHitRays::new(&rows, BATCH) };
+        let rows = AnyHitRays { end_shapes: Some(&end_shapes), ..AnyHitRays::new(&rows, BATCH) };
         accel.occluded_rows(rows, &mut occluded, Coherence::Incoherent);
-        for ((ray, target), occluded) in rays.iter().zip(targets).zip(occluded) {
-            // The mesh is no target, for it has several primitives.
-            let others = geometry.world.iter().filter(|id| id.0 == 0 || id.0 != target);
+        for ((ray, end_shape), occluded) in rays.iter().zip(end_shapes).zip(occluded) {
+            // The mesh is not skipped, for it has several primitives.
+            let others = geometry.world.iter().filter(|id| id.0 == 0 || id.0 != end_shape);
             let expected = others.into_iter().any(|&id| hits(ray, id));
-            assert_eq!(occluded, expected, "{ray:?} {target}");
+            assert_eq!(occluded, expected, "{ray:?} {end_shape}");
             changed += usize::from(!expected && accel.occluded(ray));
         }
     }

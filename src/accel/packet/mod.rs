@@ -104,8 +104,8 @@ impl Accelerator for PacketBvh<'_> {
         packets.occluded(rays.rays, rays.count.min(BATCH), occluded, |ray| self.single.occluded(ray));
     }
 
-    fn skips_target(&self, shape: ShapeId) -> bool {
-        self.packets.is_none() && self.single.skips_target(shape)
+    fn skips_end_shape(&self, shape: ShapeId) -> bool {
+        self.packets.is_none() && self.single.skips_end_shape(shape)
     }
 
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {

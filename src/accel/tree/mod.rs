@@ -59,8 +59,8 @@ pub(super) struct Batch<'r, 'a, T> {
     pub accel: &'r TwoLevel<'a, T>,
     pub rays: &'r RayRows,
     pub count: usize,
-    /// As [`AnyHitRays::targets`](super::AnyHitRays::targets).
-    pub targets: Option<&'r Row<u32>>,
+    /// As [`AnyHitRays::end_shapes`](super::AnyHitRays::end_shapes).
+    pub end_shapes: Option<&'r Row<u32>>,
 }
 
 /// A tree over items.
@@ -76,8 +76,8 @@ pub(super) trait Tree: Send + Sync + Sized {
     /// until a visit returns true. An item may be visited twice.
     fn traverse<C: Counter, const ANY: bool>(&self, query: &mut Query<'_, Self, C, ANY>);
 
-    /// Whether [`trace_rows`](Self::trace_rows) skips targets.
-    const SKIPS_TARGETS: bool = false;
+    /// Whether [`trace_rows`](Self::trace_rows) skips [end shapes](super::AnyHitRays::end_shapes).
+    const SKIPS_END_SHAPES: bool = false;
 
     /// Answers rays, or whether there are `ANY` hits.
     fn trace_rows<const ANY: bool>(batch: &Batch<'_, '_, Self>, answers: &mut impl Answers, _: Coherence) {

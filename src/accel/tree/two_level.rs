@@ -157,18 +157,18 @@ impl<T: Tree> Accelerator for TwoLevel<'_, T> {
     }
 
     fn intersect_rows(&self, rays: &RayRows, count: usize, hits: &mut HitRows, coherence: Coherence) {
-        let batch = Batch { accel: self, rays, count: count.min(BATCH), targets: None };
+        let batch = Batch { accel: self, rays, count: count.min(BATCH), end_shapes: None };
         T::trace_rows::<false>(&batch, hits, coherence);
     }
 
     fn occluded_rows(&self, rays: AnyHitRays, occluded: &mut [bool; BATCH], coherence: Coherence) {
-        let AnyHitRays { rays, count, targets } = rays;
-        let batch = Batch { accel: self, rays, count: count.min(BATCH), targets };
+        let AnyHitRays { rays, count, end_shapes } = rays;
+        let batch = Batch { accel: self, rays, count: count.min(BATCH), end_shapes };
         T::trace_rows::<true>(&batch, occluded, coherence);
     }
 
-    fn skips_target(&self, shape: ShapeId) -> bool {
-        T::SKIPS_TARGETS && self.analytic_shapes.binary_search(&shape).is_ok()
+    fn skips_end_shape(&self, shape: ShapeId) -> bool {
+        T::SKIPS_END_SHAPES && self.analytic_shapes.binary_search(&shape).is_ok()
     }
 
     fn bounds(&self) -> Aabb {

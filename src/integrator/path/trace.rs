@@ -42,7 +42,7 @@ pub(super) fn shadow(context: &Context, wave: &mut Wave, out: &mut Output, count
         let count = BATCH.min(shadows.count - first);
         // In media they have been traced already.
         if !context.scene.features.participating_media {
-            let rays = AnyHitRays { rays, count, targets: shadows.targets.get(block) };
+            let rays = AnyHitRays { rays, count, end_shapes: shadows.end_shapes.get(block) };
             context.world.accel.occluded_rows(rays, &mut occluded, coherence);
         }
         let blocked = occluded[..count].iter().filter(|&&occluded| occluded).count();

@@ -110,8 +110,8 @@ pub(super) struct ShadowQueue {
     pub count: usize,
     pub rays: Vec<RayRows>,
     pub rows: Vec<ShadowRows>,
-    /// As [`AnyHitRays::targets`], where the accelerator skips them.
-    pub targets: Vec<Row<u32>>,
+    /// As [`AnyHitRays::end_shapes`], where the accelerator skips them.
+    pub end_shapes: Vec<Row<u32>>,
 }
 
 /// Appends the chosen `$lanes` of rows, and of rows of vectors, to columns of a block and the next.
@@ -357,14 +357,19 @@ impl Wave {
             shadows.rays.push(RayRows::default());
             shadows.rows.push(ShadowRows::default());
         }
-        if let Some(targets) = &context.world.shadow_targets {
-            shadows.targets.resize(shadows.rays.len(), [AnyHitRays::NO_TARGET; BATCH]);
-            let (column, next_column) = pair(&mut shadows.targets, to);
+        if let Some(end_shapes) = &context.world.end_shapes {
+            shadows.end_shapes.resize(shadows.rays.len(), [AnyHitRays::NO_SHAPE; BATCH]);
+            let (column, next_column) = pair(&mut shadows.end_shapes, to);
             // Of connections, no light is sampled.
             let count = if scatterings == 0 { *count } else { 0 };
-            lanes.append(&targets.of_samples(light_samples, &direct.shadow_direction, count), column, next_column, at);
+            lanes.append(
+                &end_shapes.of_samples(light_samples, &direct.shadow_direction, count),
+                column,
+                next_column,
+                at,
+            );
         } else {
-            shadows.targets.clear();
+            shadows.end_shapes.clear();
         }
         let (rays, next_rays) = pair(&mut shadows.rays, to);
         append!(lanes, at, rays, next_rays, { direct.shadow_end => t_max, rows.time => time, }, {

@@ -104,7 +104,7 @@ fn shapes_that_shadow_rays_may_skip_do_not_hide_their_samples() {
             }
             for emission in [WHITE, TWO_SIDED] {
                 let light = light(&geometry, emission);
-                let Some(id) = light.shadow_target(&geometry) else { continue };
+                let Some(id) = light.end_shape(&geometry) else { continue };
                 skipped.push(name);
                 for k in 0..2_000 {
                     let distance = 0.03 * 10f64.powi(k % 7);

@@ -292,9 +292,9 @@ impl AreaLight {
         }
     }
 
-    /// As [`Light::shadow_target`](super::Light::shadow_target): a shape that is flat, or a whole sphere, of which only
+    /// As [`Light::end_shape`](super::Light::end_shape): a shape that is flat, or a whole sphere, of which only
     /// points that are seen are sampled.
-    pub(super) fn shadow_target(&self, geometry: &Geometry) -> Option<ShapeId> {
+    pub(super) fn end_shape(&self, geometry: &Geometry) -> Option<ShapeId> {
         let Shape::Analytic(placed) = geometry.shape(self.shape) else { return None };
         let is_flat = matches!(placed.shape, Analytic::Quad(_) | Analytic::Disk(_));
         (is_flat || matches!(self.form, EmitterShape::Sphere(_))).then_some(self.shape)

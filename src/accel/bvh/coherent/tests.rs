@@ -68,7 +68,7 @@ fn scene(random: &mut Sequence, size: f32) -> Geometry {
 /// Hits of rays that were traced in packets, with each instruction set, and which these are.
 fn trace_packets(accel: &TwoLevel<'_, Bvh>, rays: &RayRows) -> Vec<(HitRows, Row<u32>)> {
     let (wide, v3) = (accel.world().as_wide().unwrap(), V3::try_new().unwrap());
-    let batch = &Batch { accel, rays, count: BATCH, targets: None };
+    let batch = &Batch { accel, rays, count: BATCH, end_shapes: None };
     let mut traced = Vec::new();
     for v4 in [None, V4::try_new()] {
         let (scratch, answers) = (&mut *Box::<Scratch>::default(), &mut HitRows::default());
