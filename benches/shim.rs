@@ -12,7 +12,7 @@ use std::path::Path;
 use std::time::Instant;
 use std::{env, fs};
 
-use steradian::internal::accel::{Accelerator, Coherence, EmbreeAccel, HitRows};
+use steradian::internal::accel::{Accelerator, AnyHitRays, Coherence, EmbreeAccel, HitRows};
 use steradian::internal::geometry::{Geometry, Hit, Mesh, Shape};
 use steradian::internal::id::ShapeId;
 use steradian::internal::math::rows::BATCH;
@@ -222,7 +222,7 @@ fn run(
         Query::Any(Some(coherence)) => {
             rows.iter()
                 .zip(&mut found.occluded)
-                .for_each(|(rows, occluded)| accel.occluded_rows(rows, BATCH, occluded, coherence));
+                .for_each(|(rows, occluded)| accel.occluded_rows(AnyHitRays::new(rows, BATCH), occluded, coherence));
         }
     }
 }
