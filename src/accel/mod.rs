@@ -69,7 +69,7 @@ pub trait Accelerator: Send + Sync {
         }
     }
 
-    /// Whether [`occluded_rows`](Self::occluded_rows) skips this shape where a [ray ends on it](AnyHitRays::end_shapes).
+    /// Whether [`occluded_rows`](Self::occluded_rows) skips this shape as an [end shape](AnyHitRays::end_shapes).
     fn skips_end_shape(&self, shape: ShapeId) -> bool {
         let _ = shape;
         false
