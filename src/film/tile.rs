@@ -244,8 +244,8 @@ impl FilmTile {
         WorldSample { slot: 0, pixel: pixel as u32, entry, sample: 0, place: FilterSample::default() }
     }
 
-    /// As [`add`](Self::add), to all pixels that a shared sample of this filter reaches. `splats` collects samples of
-    /// one cell, and [`flush`](Self::flush) adds them to the tile.
+    /// As [`add`](Self::add), to all pixels that a sample of this filter reaches, which [shares](Filter::is_shared) its
+    /// samples. `splats` collects samples of one cell, and [`flush`](Self::flush) adds them to the tile.
     #[inline]
     pub fn splat<'a>(
         &mut self,

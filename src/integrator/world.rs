@@ -40,7 +40,7 @@ pub struct World<'a> {
     pub(super) subsurface: SubsurfaceShapes,
     /// Emitters whose specular reflections are added without choosing among lobes.
     pub(super) emitter_prims: Option<EmitterPrims>,
-    /// `None` if the accelerator skips none.
+    /// Lights that shadow rays to them need not be tested with; `None` if the accelerator skips none.
     pub(super) end_shapes: Option<EndShapes>,
 }
 
