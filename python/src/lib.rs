@@ -7,6 +7,10 @@ mod scene;
 mod watch;
 
 use pyo3::prelude::*;
+use steradian::internal::memory::HugePages;
+
+#[global_allocator]
+static ALLOCATOR: HugePages = HugePages;
 
 /// The compiled part of the package `steradian`.
 #[pymodule]

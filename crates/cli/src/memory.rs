@@ -3,7 +3,7 @@
 //! Rust ends with SIGABRT and a backtrace, C++ by an exception that nobody catches. What is done here takes no memory,
 //! and runs no destructors, which other threads may be in the way of.
 
-use std::alloc::{GlobalAlloc, Layout, System};
+use std::alloc::{GlobalAlloc, Layout};
 use std::ffi::{CStr, c_char, c_int};
 use std::fmt::Write as _;
 use std::fs::File;
@@ -17,7 +17,7 @@ use rustix::mm::{MapFlags, ProtFlags, mmap_anonymous, munmap};
 use signal_hook::consts::SIGABRT;
 use signal_hook::low_level::{emulate_default_handler, register};
 use steradian::internal::accel::on_uncaught_exception;
-use steradian::internal::memory::is_fallible;
+use steradian::internal::memory::{HugePages, is_fallible};
 
 use crate::log;
 
@@ -29,7 +29,7 @@ unsafe extern "C" {
     fn _exit(code: c_int) -> !;
 }
 
-/// The system's allocator, but it ends the program where it has no memory.
+/// The library's allocator, but it ends the program where it has no memory.
 struct Allocator;
 
 #[global_allocator]
@@ -43,26 +43,26 @@ fn checked(memory: *mut u8, size: usize) -> *mut u8 {
     memory
 }
 
-// SAFETY: every method is that of the system's allocator with the same arguments; what it returns is returned.
+// SAFETY: every method is that of the library's allocator with the same arguments; what it returns is returned.
 unsafe impl GlobalAlloc for Allocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: the caller's obligations are those of the same method.
-        checked(unsafe { System.alloc(layout) }, layout.size())
+        checked(unsafe { HugePages.alloc(layout) }, layout.size())
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         // SAFETY: as above.
-        checked(unsafe { System.alloc_zeroed(layout) }, layout.size())
+        checked(unsafe { HugePages.alloc_zeroed(layout) }, layout.size())
     }
 
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         // SAFETY: as above.
-        checked(unsafe { System.realloc(memory, layout, size) }, size)
+        checked(unsafe { HugePages.realloc(memory, layout, size) }, size)
     }
 
     unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
         // SAFETY: as above.
-        unsafe { System.dealloc(memory, layout) }
+        unsafe { HugePages.dealloc(memory, layout) }
     }
 }
 

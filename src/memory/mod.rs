@@ -1,6 +1,10 @@
-//! Requests for memory that may fail.
+//! Requests for memory that may fail, and an allocator for programs.
+
+mod huge_pages;
 
 use std::cell::Cell;
+
+pub use huge_pages::HugePages;
 
 thread_local! {
     static FALLIBLE: Cell<bool> = const { Cell::new(false) };
