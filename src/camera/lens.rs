@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::math::DVec2;
+use crate::math::{DVec2, DVec3};
 use crate::sampling::warp;
 
 /// A thin lens.
@@ -29,11 +29,24 @@ impl Lens {
     /// A point of the aperture, uniform by area; `u` in the unit square.
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> DVec2 {
-        let point = match &self.blades {
-            None => warp::concentric_disk(u).as_dvec2(),
-            Some(blades) => blades.sample(u),
-        };
-        point * self.radius
+        match &self.blades {
+            None => self.on_disk(u),
+            Some(blades) => blades.sample(u) * self.radius,
+        }
+    }
+
+    /// [`sample`](Self::sample) of an aperture without blades.
+    #[inline(always)]
+    pub fn on_disk(&self, u: [f32; 2]) -> DVec2 {
+        warp::concentric_disk(u).as_dvec2() * self.radius
+    }
+
+    /// Origin and direction, in the camera's space, of the ray from a point of the aperture to the point in focus that
+    /// a pinhole would see `toward` a point at z = -1.
+    #[inline(always)]
+    pub fn through(&self, point: DVec2, toward: DVec3) -> (DVec3, DVec3) {
+        let on_lens = point.extend(0.0);
+        (on_lens, toward * self.focus_distance - on_lens)
     }
 }
 

@@ -196,26 +196,24 @@ impl Camera {
     /// the lens that `lens_u` (in the unit square) chooses, at a [time](Self::time). The direction is unit.
     #[inline]
     pub fn ray(&self, film: Vec2, size: [u32; 2], lens_u: [f32; 2], time: f32) -> Ray {
-        let (mut origin, direction) = match &self.projection {
+        let (origin, direction) = match &self.projection {
             Projection::Perspective { half_height, lens } => {
                 let toward = self.on_picture(film, size, *half_height);
-                match lens {
+                let (from, direction) = match lens {
                     None => (DVec3::ZERO, toward),
-                    Some(lens) => {
-                        let on_lens = lens.sample(lens_u).extend(0.0);
-                        (on_lens, toward * lens.focus_distance - on_lens)
-                    }
-                }
+                    Some(lens) => lens.through(lens.sample(lens_u), toward),
+                };
+                (self.at_near(from, direction), direction)
             }
             Projection::Orthographic { half_height } => {
-                (self.on_picture(film, size, *half_height) + DVec3::Z, -DVec3::Z)
+                let from = self.on_picture(film, size, *half_height) + DVec3::Z;
+                (self.at_near(from, -DVec3::Z), -DVec3::Z)
             }
-            Projection::Environment => (DVec3::ZERO, everywhere(film, size)),
+            Projection::Environment => {
+                let direction = everywhere(film, size);
+                (DVec3::ZERO + direction * self.near, direction)
+            }
         };
-        if self.near > 0.0 {
-            let unit = if matches!(self.projection, Projection::Environment) { 1.0 } else { -direction.z };
-            origin += direction * (self.near / unit);
-        }
         let (origin, direction) = match &self.motion {
             None => (self.world_from_camera.point(origin), self.world_from_camera.vector(direction)),
             Some(motion) => moved(motion, time, origin, direction),
@@ -223,10 +221,10 @@ impl Camera {
         Ray { time, ..Ray::new(origin.as_vec3(), direction.normalize().as_vec3()) }
     }
 
-    /// Where a pinhole camera's ray starts in the camera's space that goes `toward` a point at z = -1.
+    /// Where a ray `from` z = 0 in the camera's space starts, as far along the view axis as nothing nearer is seen.
     #[inline(always)]
-    fn pinhole_start(&self, toward: DVec3) -> DVec3 {
-        if self.near > 0.0 { DVec3::ZERO + toward * (self.near / -toward.z) } else { DVec3::ZERO }
+    fn at_near(&self, from: DVec3, direction: DVec3) -> DVec3 {
+        if self.near > 0.0 { from + direction * (self.near / -direction.z) } else { from }
     }
 
     /// The cone of a pixel around one of the camera's rays, which may start further along: as wide as the root of the

@@ -1,7 +1,9 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::*;
-use crate::math::DAffine3;
+use crate::math::rows::{BATCH, pair};
+use crate::math::{DAffine3, RayRows, Rng};
+use crate::sampling::SampleRows;
 
 const PLACE: DVec3 = DVec3::new(1.0, 2.0, 3.0);
 
@@ -155,4 +157,27 @@ fn a_camera_that_turns_looks_along_its_turned_axis_at_each_time() {
 fn time_is_drawn_only_while_the_shutter_is_open() {
     assert_eq!(camera(None).time(0.3), 0.3);
     assert_eq!(camera(None).with_shutter([2.0, 2.0]).time(0.3), 0.0);
+}
+
+#[test]
+fn rays_of_batches_are_those_of_single_points() {
+    let lens = Lens { radius: 0.1, focus_distance: 2.0, blades: None };
+    let mut rng = Rng::new(1);
+    // The first is the centre of the picture and of the lens.
+    let numbers: Vec<[f32; 4]> =
+        (0..BATCH).map(|i| if i == 0 { [0.5; 4] } else { std::array::from_fn(|_| rng.unit_f32()) }).collect();
+    let size = [200, 100];
+    let film = [0, 1].map(|k| std::array::from_fn(|i| numbers[i][k] * size[k] as f32));
+    for (lens, near) in [(None, 0.0), (None, 0.75), (Some(lens), 0.0), (Some(lens), 0.75)] {
+        let camera = camera(lens).with_near(near);
+        let mut rays = RayRows::default();
+        let picture = camera.perspective(size).unwrap();
+        camera.perspective_rays(&picture, &film, &SampleRows::new(&numbers), &mut rays, BATCH);
+        for (i, [_, _, u, v]) in numbers.iter().copied().enumerate() {
+            assert_eq!(rays.get(i), camera.ray(Vec2::from(pair(&film, i)), size, [u, v], 0.0), "{lens:?} {near} {i}");
+        }
+    }
+    let blades = Some(Blades { count: 5, rotation: 0.0 });
+    assert!(camera(Some(Lens { blades, ..lens })).perspective(size).is_none());
+    assert!(placed(Projection::Environment).perspective(size).is_none());
 }

@@ -365,8 +365,8 @@ impl<'a> TileRenderer<'a> {
                     camera.time(self.sampler.sample_4d(requests.pixels[i], requests.samples[i], dimensions::TIME)[0]);
             }
         }
-        if camera.is_pinhole() {
-            camera.pinhole_rays(self.view, film, rays, count);
+        if let Some(picture) = camera.perspective(self.view) {
+            camera.perspective_rays(&picture, film, numbers, rays, count);
         } else {
             for i in 0..count {
                 let (u, at) = (numbers.of(i), Vec2::from(pair(film, i)));

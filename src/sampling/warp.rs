@@ -5,7 +5,7 @@ use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 use crate::math::{Vec2, Vec3, sin_cos_eighth, sin_cos_turns, unit_circle, vec2, vec3};
 
 /// Uniform on the unit disk (Shirley and Chiu, "A Low Distortion Map Between Disk and Square"); density `1 / pi`.
-#[inline]
+#[inline(always)]
 pub fn concentric_disk(u: [f32; 2]) -> Vec2 {
     concentric(u).0
 }
