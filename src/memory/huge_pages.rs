@@ -8,7 +8,7 @@ use rustix::mm::{Advice, madvise};
 const HUGE_PAGE: usize = 2 << 20;
 
 /// The system's allocator, with blocks of at least 2 MiB at multiples of 2 MiB and advised to be in transparent huge
-/// pages, where the system has them. Texels, meshes and trees, which are read in no order, then miss the TLB less often.
+/// pages, where the system has them. Texels, meshes and trees, which are read in no order, then miss the TLB less.
 /// Such a block does not grow in place.
 pub struct HugePages;
 
