@@ -14,5 +14,5 @@ pub mod warp;
 pub use bilinear::{BilinearDensity, BilinearTable, BilinearWarp, SliceMix};
 pub use discrete::{AliasTable, DiscreteSample};
 pub use mis::power_heuristic;
-pub use piecewise::{Piecewise2d, PiecewiseCell, PiecewiseSample};
+pub use piecewise::{Piecewise2d, PiecewiseCell, PiecewiseCellRows, PiecewiseSample, PiecewiseScratch};
 pub use sampler::{PixelSeed, SampleIdRows, SampleRows, Sampler, SamplerKind};

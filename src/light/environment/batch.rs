@@ -1,13 +1,13 @@
 //! Many directions of an image at once: what is computed is computed in rows, and what waits for memory is nothing but
 //! copies, which do not wait for one another.
 
-use super::{CellDensity, EnvironmentMap, Location};
+use super::{BandRows, CellDensity, EnvironmentMap, Location};
 use crate::color::{Rgb, RgbRows};
 use crate::light::{InfiniteLightEvalRows, MisCompensation};
 use crate::math::Vec3;
-use crate::math::rows::{BATCH, Element, Row, Vec3Rows, soa, whole_vectors};
+use crate::math::rows::{BATCH, Row, Vec3Rows, soa, whole_vectors};
 use crate::math::vectorize::vectorize;
-use crate::sampling::PiecewiseCell;
+use crate::sampling::{PiecewiseCellRows, PiecewiseScratch};
 
 soa! {
     /// As [`Location`].
@@ -30,21 +30,6 @@ soa! {
 }
 
 soa! {
-    /// Cells that were chosen, as [`PiecewiseCell`].
-    struct CellRows {
-        x: u32,
-        y: u32,
-        u: f32,
-        v: f32,
-        pmf: f32,
-        inverse_solid_angle: f32,
-        /// Cosines of the polar angle at the cell's upper and lower limit.
-        upper_cosine: f64,
-        lower_cosine: f64,
-    }
-}
-
-soa! {
     /// Light samples from infinity.
     pub struct InfiniteLightSampleRows {
         /// Unit direction to the light.
@@ -57,22 +42,13 @@ soa! {
 }
 
 /// Buffers for many directions of an image.
+#[derive(Default)]
 pub struct EnvironmentScratch {
     locations: LocationRows,
     corners: CornerRows,
-    cells: CellRows,
-    chosen: [PiecewiseCell; BATCH],
-}
-
-impl Default for EnvironmentScratch {
-    fn default() -> Self {
-        Self {
-            locations: LocationRows::default(),
-            corners: CornerRows::default(),
-            cells: CellRows::default(),
-            chosen: [PiecewiseCell::default(); BATCH],
-        }
-    }
+    chosen: PiecewiseScratch,
+    cells: PiecewiseCellRows,
+    bands: BandRows,
 }
 
 impl LocationRows {
@@ -131,18 +107,25 @@ impl EnvironmentScratch {
         samples: &mut InfiniteLightSampleRows,
     ) -> bool {
         let Some(density) = map.density(compensation) else { return false };
-        let Self { locations, corners, cells, chosen } = self;
-        density.cells.sample_cells(&u[..count], chosen);
-        for (i, cell) in chosen.iter().enumerate().take(count) {
-            (cells.x[i], cells.y[i], cells.pmf[i]) = (cell.x as u32, cell.y as u32, cell.pmf);
-            [cells.u[i], cells.v[i]] = cell.within;
-            cells.inverse_solid_angle[i] = map.inverse_solid_angles[cell.y];
-            (cells.upper_cosine[i], cells.lower_cosine[i]) = (map.cosines[cell.y], map.cosines[cell.y + 1]);
-            map.prefetch_corners(cell.x, cell.y);
+        self.chosen.sample_cells(&density.cells, u, count, &mut self.cells);
+        for (i, (&x, &y)) in self.cells.x.iter().zip(&self.cells.y).enumerate().take(count) {
+            self.bands.set(i, &map.bands[y as usize]);
+            map.prefetch_corners(x as usize, y as usize);
         }
-        vectorize!(find_directions(map, cells, locations, samples, count));
-        look_up(map, locations, count, corners, &mut samples.radiance);
+        vectorize!(self.find_directions(map, samples, count));
+        look_up(map, &self.locations, count, &mut self.corners, &mut samples.radiance);
         true
+    }
+
+    #[inline(always)]
+    fn find_directions(&mut self, map: &EnvironmentMap, samples: &mut InfiniteLightSampleRows, count: usize) {
+        for i in 0..whole_vectors(count) {
+            let (cell, band) = (self.cells.get(i), self.bands.get(i));
+            let (wi, at) = map.direction_in(&cell, &band);
+            self.locations.set(i, at);
+            samples.wi.set(i, wi);
+            samples.pdf[i] = cell.pmf * band.inverse_solid_angle;
+        }
     }
 }
 
@@ -168,26 +151,6 @@ fn look_up(
 fn locate(map: &EnvironmentMap, directions: &Vec3Rows, locations: &mut LocationRows, count: usize) {
     for i in 0..whole_vectors(count) {
         locations.set(i, map.locate(directions.get(i)));
-    }
-}
-
-#[inline(always)]
-fn find_directions(
-    map: &EnvironmentMap,
-    cells: &CellRows,
-    locations: &mut LocationRows,
-    samples: &mut InfiniteLightSampleRows,
-    count: usize,
-) {
-    for i in 0..whole_vectors(count) {
-        let (wi, at) = map.direction_in(
-            [cells.x[i], cells.y[i]],
-            [cells.u[i], cells.v[i]],
-            [cells.upper_cosine[i], cells.lower_cosine[i]],
-        );
-        locations.set(i, at);
-        samples.wi.set(i, wi);
-        samples.pdf[i] = cells.pmf[i] * <f32 as Element>::get(&cells.inverse_solid_angle, i);
     }
 }
 

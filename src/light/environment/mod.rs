@@ -20,6 +20,7 @@ use std::sync::OnceLock;
 use super::{InfiniteLightEval, LightSample, MisCompensation};
 use crate::color::Rgb;
 use crate::math::prefetch::{address, prefetch_lines};
+use crate::math::rows::soa;
 use crate::math::{DMat3, Vec3, angle_of, unit_circle};
 use crate::sampling::warp::{UNIFORM_SPHERE_PDF, uniform_sphere};
 use crate::sampling::{Piecewise2d, PiecewiseCell};
@@ -135,10 +136,19 @@ pub struct EnvironmentMap {
     /// lies between the centres of texels i and i + 1; row j between those of rows j - 1 and j, the first and the last
     /// between the outermost centres and the poles.
     densities: [OnceLock<Option<CellDensity>>; 2],
-    /// Cosine of the polar angle at the upper limit of each row of the density, and at the lower pole.
-    cosines: Vec<f64>,
-    /// 1 over the solid angle of the cells of each row.
-    inverse_solid_angles: Vec<f32>,
+    /// Of each row of the density.
+    bands: Vec<Band>,
+}
+
+soa! {
+    /// What the cells of a row have in common.
+    struct BandRows of Band {
+        /// Cosines of the polar angle at the upper and the lower limit.
+        upper: f64,
+        lower: f64,
+        /// 1 over the solid angle of a cell.
+        inverse_solid_angle: f32,
+    }
 }
 
 /// How cells are chosen.
@@ -222,8 +232,12 @@ impl EnvironmentMap {
         let limit = |row: usize| (row as f64 - 0.5).clamp(0.0, height as f64) / height as f64;
         let cosines: Vec<_> = (0..=height + 1).map(|row| (PI * limit(row)).cos()).collect();
         let inverse_solid_angle = |cap: f64| width as f32 / (TAU * cap as f32);
-        let inverse_solid_angles = cosines.windows(2).map(|row| inverse_solid_angle(row[0] - row[1])).collect();
-        Ok(Self { width, height, texels, axes, densities: Default::default(), cosines, inverse_solid_angles })
+        let band = |limits: &[f64]| {
+            let (upper, lower) = (limits[0], limits[1]);
+            Band { upper, lower, inverse_solid_angle: inverse_solid_angle(upper - lower) }
+        };
+        let bands = cosines.windows(2).map(band).collect();
+        Ok(Self { width, height, texels, axes, densities: Default::default(), bands })
     }
 
     /// Of each cell, the mean of the bilinear luminance (its corners' mean) times the solid angle.
@@ -231,7 +245,7 @@ impl EnvironmentMap {
         let row = |y: usize| -> Vec<f64> {
             self.texels[y * self.width..(y + 1) * self.width].iter().map(|&t| brightness(t).into()).collect()
         };
-        let solid_angle = |y: usize| (self.cosines[y] - self.cosines[y + 1]) * 2.0 * PI / self.width as f64;
+        let solid_angle = |y: usize| (self.bands[y].upper - self.bands[y].lower) * 2.0 * PI / self.width as f64;
         let mut weights = Vec::with_capacity(self.width * (self.height + 1));
         let mut upper = row(0);
         for y in 0..=self.height {
@@ -320,18 +334,20 @@ impl EnvironmentMap {
     /// A direction chosen by a density.
     #[inline]
     fn choose(&self, density: &Piecewise2d, u: [f32; 2]) -> Chosen {
-        let PiecewiseCell { x, y, within, pmf } = density.sample_cell(u);
-        let (wi, at) = self.direction_in([x as u32, y as u32], within, [self.cosines[y], self.cosines[y + 1]]);
-        Chosen { wi, at, pdf: pmf * self.inverse_solid_angles[y] }
+        let cell = density.sample_cell(u);
+        let band = self.bands[cell.y as usize];
+        let (wi, at) = self.direction_in(&cell, &band);
+        Chosen { wi, at, pdf: cell.pmf * band.inverse_solid_angle }
     }
 
-    /// The direction at a point within a cell, which has these cosines at its upper and lower limit.
+    /// The direction at the point within a cell, which is in a band.
     #[inline(always)]
-    fn direction_in(&self, [column, row]: [u32; 2], within: [f32; 2], [upper, lower]: [f64; 2]) -> (Vec3, Location) {
+    fn direction_in(&self, cell: &PiecewiseCell, band: &Band) -> (Vec3, Location) {
+        let [within_x, within_y] = cell.within.to_array();
         // Uniform on the cell: in the cosine of the polar angle and in the azimuth.
-        let cos = upper + f64::from(within[1]) * (lower - upper);
+        let cos = band.upper + f64::from(within_y) * (band.lower - band.upper);
         let sin = ((1.0 - cos) * (1.0 + cos)).max(0.0).sqrt();
-        let x = column as f32 + 0.5 + within[0];
+        let x = cell.x as f32 + 0.5 + within_x;
         let x = if x >= self.width as f32 { x - self.width as f32 } else { x };
         // u = 1/2 is -Z and the azimuth turns towards +X.
         let around = unit_circle(x / self.width as f32) * sin;
@@ -339,8 +355,8 @@ impl EnvironmentMap {
         let wi = right * -around.y as f32 + up * cos as f32 + back * around.x as f32;
 
         let theta = angle_of(sin as f32, cos as f32);
-        let t = theta * FRAC_1_PI * self.height as f32 + 0.5 - row as f32;
-        (wi.normalize(), Location { x: column, y: row, within: [within[0], t.clamp(0.0, 1.0)] })
+        let t = theta * FRAC_1_PI * self.height as f32 + 0.5 - cell.y as f32;
+        (wi.normalize(), Location { x: cell.x, y: cell.y, within: [within_x, t.clamp(0.0, 1.0)] })
     }
 }
 

@@ -77,7 +77,7 @@ fn the_density_is_that_of_choosing_cells() {
         for compensation in [MisCompensation::Off, MisCompensation::On] {
             let density = map.density(compensation).unwrap();
             for (x, y) in (0..=17).flat_map(|y| (0..33).map(move |x| (x, y))) {
-                let expected = density.cells.pmf(x, y) * map.inverse_solid_angles[y];
+                let expected = density.cells.pmf(x, y) * map.bands[y].inverse_solid_angle;
                 let pdf = density.pdf(map.corners(x, y));
                 assert!((pdf - expected).abs() <= 2e-6 * expected + 1e-7, "{scale} {x} {y} {pdf} {expected}");
             }

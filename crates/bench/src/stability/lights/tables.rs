@@ -3,7 +3,7 @@
 use super::{Effort, Faults, Outcome, Tests};
 use crate::math::Rng;
 use crate::math::float::ONE_MINUS_EPSILON;
-use crate::sampling::{AliasTable, Piecewise2d};
+use crate::sampling::{AliasTable, Piecewise2d, PiecewiseCell};
 
 /// Weights of few and of many entries, with zeros in all places and of very different sizes.
 fn tables() -> Vec<Vec<f64>> {
@@ -80,10 +80,12 @@ pub(super) fn l9_tables(effort: Effort) -> Outcome {
         let total: f64 = weights.iter().map(|w| f64::from(*w)).sum();
         let count = effort.pick(100_000, 10_000_000);
         let mut counts = vec![0u32; weights.len()];
+        let place = |cell: &PiecewiseCell| cell.y as usize * width + cell.x as usize;
         for _ in 0..count {
             let cell = density.sample_cell(rng.pair());
-            counts[cell.y * width + cell.x] += 1;
-            let exact = f64::from(weights[cell.y * width + cell.x]) / total;
+            let at = place(&cell);
+            counts[at] += 1;
+            let exact = f64::from(weights[at]) / total;
             // Tables count in 2^-32, and each cell and each row has one unit at least; the pdf is rounded to f32.
             let unit = (width + height) as f64 / f64::from(u32::MAX) + exact * f64::from(f32::EPSILON);
             cells = cells.max((f64::from(cell.pmf) - exact).abs() / unit);
@@ -93,8 +95,8 @@ pub(super) fn l9_tables(effort: Effort) -> Outcome {
         for u in [[0.0, 0.0], [0.0, ONE_MINUS_EPSILON], [ONE_MINUS_EPSILON, 0.0], [ONE_MINUS_EPSILON; 2]] {
             let cell = density.sample_cell(u);
             let describe = || format!("{width} x {height} for {u:?}: {cell:?}");
-            zero.require(weights[cell.y * width + cell.x] != 0.0, describe);
-            out_of_range.require(cell.within.iter().all(|w| (0.0..1.0).contains(w)), describe);
+            zero.require(weights[place(&cell)] != 0.0, describe);
+            out_of_range.require(cell.within.to_array().iter().all(|w| (0.0..1.0).contains(w)), describe);
         }
     }
     let outcome = Outcome::new()

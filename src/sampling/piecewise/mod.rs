@@ -4,16 +4,15 @@
 //! stay in the processor's caches, a cell by the weights of its block, which are one cache line: a sample waits for
 //! memory once, however large the grid is.
 
-use pulp::cast;
-use pulp::x86::V4;
+mod batch;
+mod table;
 
+use crate::math::Vec2;
 use crate::math::float::ONE_MINUS_EPSILON;
-use crate::math::prefetch::prefetch;
-use crate::math::vectorize::vectorize;
+use crate::math::rows::soa;
 
-/// The whole of a cumulative table. Tables count in units of `1 / WHOLE`: the density is then exactly that of the
-/// sampling, and a cell of positive weight never rounds to nothing.
-const WHOLE: u32 = u32::MAX;
+pub use batch::PiecewiseScratch;
+use table::{Portable, Table, invert};
 
 /// A point chosen by a [`Piecewise2d`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,17 +23,18 @@ pub struct PiecewiseSample {
     pub pdf: f32,
 }
 
-/// A cell chosen by a [`Piecewise2d`].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PiecewiseCell {
-    /// The column.
-    pub x: usize,
-    /// The row.
-    pub y: usize,
-    /// Where in the cell, in `[0, 1)²`.
-    pub within: [f32; 2],
-    /// Probability of the cell.
-    pub pmf: f32,
+soa! {
+    /// A cell chosen by a [`Piecewise2d`].
+    pub struct PiecewiseCellRows of PiecewiseCell {
+        /// The column.
+        x: u32,
+        /// The row.
+        y: u32,
+        /// Where in the cell, in `[0, 1)²`.
+        within: Vec2,
+        /// Probability of the cell.
+        pmf: f32,
+    }
 }
 
 /// A density on `[0, 1)²` that is constant on each cell of a grid; rows run along u, row 0 is at v = 0.
@@ -90,6 +90,19 @@ impl Block {
         let sum = (columns[0] + columns[1]) + (columns[2] + columns[3]);
         ((pmf * f64::from(weight / sum)) as f32).max(f32::MIN_POSITIVE)
     }
+
+    /// The cell at a point of a block that has the probability `pmf`, `at` these columns and rows of blocks.
+    #[inline(always)]
+    fn cell(&self, at: [usize; 2], point: Vec2, pmf: f64) -> PiecewiseCell {
+        let (y, v) = invert_four(&self.rows(), point.y);
+        let (x, u) = invert_four(&self.0[y], point.x);
+        PiecewiseCell {
+            x: (SIDE * at[0] + x) as u32,
+            y: (SIDE * at[1] + y) as u32,
+            within: Vec2::new(u, v),
+            pmf: self.pmf(x, y, pmf),
+        }
+    }
 }
 
 /// The entry of a distribution of four weights at `u` in `[0, 1)`, never one of weight 0, and where in it `u` is.
@@ -100,155 +113,6 @@ fn invert_four(weights: &[f32; SIDE], u: f32) -> (usize, f32) {
     let x = u * (limits[3] + d);
     let index = usize::from(x >= limits[1]) + usize::from(x >= limits[2]) + usize::from(x >= limits[3]);
     (index, ((x - limits[index]) / weights[index]).min(ONE_MINUS_EPSILON))
-}
-
-/// Cumulative distributions of equal length, each a search tree whose nodes have [`FANOUT`] keys: a search has no
-/// branches, and all of its nodes but the last are few enough to stay in the caches.
-#[derive(Clone, Debug)]
-struct Table {
-    len: usize,
-    /// From the roots, one for each distribution, to the leaves.
-    levels: Vec<TableLevel>,
-}
-
-/// Nodes of the search trees at one depth.
-#[derive(Clone, Debug)]
-struct TableLevel {
-    /// Nodes of each tree.
-    count: usize,
-    /// Of leaves, the upper limits of entries, within `[0, WHOLE]`; of others, those of the last entries below each
-    /// child. Unused keys are [`WHOLE`].
-    nodes: Vec<Keys>,
-}
-
-/// Keys of a node: a cache line of them.
-const FANOUT: usize = 16;
-
-#[derive(Clone, Copy, Debug)]
-#[repr(align(64))]
-struct Keys([u32; FANOUT]);
-
-/// Counts keys.
-trait CountKeys: Copy {
-    /// How many keys are not above a limit.
-    fn count_up_to(self, keys: &Keys, limit: u32) -> u32;
-}
-
-/// On every processor.
-#[derive(Clone, Copy)]
-struct Portable;
-
-impl CountKeys for Portable {
-    #[inline(always)]
-    fn count_up_to(self, Keys(keys): &Keys, limit: u32) -> u32 {
-        keys.iter().map(|&key| u32::from(key <= limit)).sum()
-    }
-}
-
-impl CountKeys for V4 {
-    // One comparison gives a bit for each key, which the compiler does not find by itself.
-    #[inline(always)]
-    fn count_up_to(self, Keys(keys): &Keys, limit: u32) -> u32 {
-        let limits = self.avx512f._mm512_set1_epi32(limit as i32);
-        self.avx512f._mm512_cmple_epu32_mask(cast(*keys), limits).count_ones()
-    }
-}
-
-/// A block that was chosen.
-#[derive(Clone, Copy, Default)]
-struct ChosenBlock {
-    x: usize,
-    y: usize,
-    within: [f32; 2],
-    pmf: f64,
-}
-
-impl ChosenBlock {
-    /// A cell of the block.
-    #[inline(always)]
-    fn cell_in(&self, block: &Block) -> PiecewiseCell {
-        let (y, v) = invert_four(&block.rows(), self.within[1]);
-        let (x, u) = invert_four(&block.0[y], self.within[0]);
-        PiecewiseCell { x: SIDE * self.x + x, y: SIDE * self.y + y, within: [u, v], pmf: block.pmf(x, y, self.pmf) }
-    }
-}
-
-#[derive(Clone, Copy)]
-struct Inverse {
-    index: usize,
-    within: f32,
-    pmf: f64,
-}
-
-impl Table {
-    fn new(len: usize, count: usize) -> Self {
-        let mut levels = Vec::new();
-        let mut nodes = len;
-        while nodes > 1 || levels.is_empty() {
-            nodes = nodes.div_ceil(FANOUT);
-            levels.push(TableLevel { count: nodes, nodes: Vec::with_capacity(nodes * count) });
-        }
-        levels.reverse();
-        Self { len, levels }
-    }
-
-    /// Adds one distribution. Each positive weight has at least one unit; those and the rest, in proportion, fill the
-    /// whole. Without any positive weight all is in the last entry.
-    fn push(&mut self, weights: impl Iterator<Item = f64> + Clone) {
-        let positive = weights.clone().filter(|w| *w > 0.0).count();
-        let total: f64 = weights.clone().sum();
-        let free = f64::from(WHOLE) - positive as f64;
-        let (mut units, mut sum) = (0u64, 0.0);
-        let limit = |w: f64| {
-            if w > 0.0 {
-                units += 1;
-                sum += w;
-            }
-            let limit = if total > 0.0 { units + (sum / total * free).round() as u64 } else { 0 };
-            limit.min(u64::from(WHOLE)) as u32
-        };
-        let mut keys: Vec<u32> = weights.map(limit).collect();
-        if total <= 0.0 {
-            keys[self.len - 1] = WHOLE;
-        }
-        for level in self.levels.iter_mut().rev() {
-            let nodes =
-                keys.chunks(FANOUT).map(|keys| Keys(std::array::from_fn(|i| keys.get(i).copied().unwrap_or(WHOLE))));
-            level.nodes.extend(nodes);
-            keys = keys.chunks(FANOUT).filter_map(|keys| keys.last().copied()).collect();
-        }
-    }
-
-    /// The limits of an entry.
-    #[inline(always)]
-    fn limits(&self, which: usize, index: usize) -> [u32; 2] {
-        let Some(leaves) = self.levels.last() else { return [0; 2] };
-        let keys = &leaves.nodes[which * leaves.count..][..leaves.count];
-        let upper = |index: usize| keys[index / FANOUT].0[index % FANOUT];
-        [if index == 0 { 0 } else { upper(index - 1) }, upper(index)]
-    }
-
-    #[inline]
-    fn pmf(&self, which: usize, index: usize) -> f64 {
-        let [lower, upper] = self.limits(which, index);
-        f64::from(upper - lower) * (1.0 / f64::from(WHOLE))
-    }
-
-    /// Inverts a distribution at `u` in `[0, 1)`: the entry with `lower <= u < upper`.
-    #[inline(always)]
-    fn invert(&self, by: impl CountKeys, which: usize, u: f32) -> Inverse {
-        let x = f64::from(u) * f64::from(WHOLE);
-        let unit = x as u32;
-        let mut index = 0;
-        for level in &self.levels {
-            let before = by.count_up_to(&level.nodes[which * level.count + index], unit);
-            index = index * FANOUT + before as usize;
-        }
-        let [lower, upper] = self.limits(which, index);
-        let mass = f64::from(upper - lower);
-        let within = ((x - f64::from(lower)) / mass) as f32;
-        Inverse { index, within: within.min(ONE_MINUS_EPSILON), pmf: mass * (1.0 / f64::from(WHOLE)) }
-    }
 }
 
 impl Piecewise2d {
@@ -285,56 +149,22 @@ impl Piecewise2d {
     /// the second the row.
     #[inline]
     pub fn sample_cell(&self, u: [f32; 2]) -> PiecewiseCell {
-        let chosen = self.choose_block(Portable, u);
-        chosen.cell_in(&self.blocks[self.block_at(&chosen)])
-    }
-
-    /// Cells for as many numbers as there are places for the results, as [`sample_cell`](Self::sample_cell): all wait
-    /// for memory at once.
-    #[inline]
-    pub fn sample_cells<const N: usize>(&self, us: &[[f32; 2]], cells: &mut [PiecewiseCell; N]) {
-        let mut chosen = [ChosenBlock::default(); N];
-        match V4::try_new() {
-            Some(simd) => simd.vectorize(
-                #[inline(always)]
-                || self.choose_blocks(simd, us, &mut chosen),
-            ),
-            None => vectorize!(self.choose_blocks(Portable, us, &mut chosen)),
-        }
-        // Nothing but copies, which do not wait for one another.
-        let mut blocks = [Block::default(); N];
-        for (block, chosen) in blocks.iter_mut().zip(&chosen).take(us.len()) {
-            *block = self.blocks[self.block_at(chosen)];
-        }
-        for ((cell, chosen), block) in cells.iter_mut().zip(&chosen).zip(&blocks).take(us.len()) {
-            *cell = chosen.cell_in(block);
-        }
+        let (y, rows) = self.rows.find(Portable, 0, u[1]);
+        let (x, columns) = self.columns.find(Portable, y, u[0]);
+        let (row, column) = (invert(u[1], rows), invert(u[0], columns));
+        let within = Vec2::new(column.within, row.within);
+        self.blocks[self.block_at(x, y)].cell([x, y], within, row.pmf * column.pmf)
     }
 
     #[inline(always)]
-    fn choose_blocks(&self, by: impl CountKeys, us: &[[f32; 2]], chosen: &mut [ChosenBlock]) {
-        for (chosen, &u) in chosen.iter_mut().zip(us) {
-            *chosen = self.choose_block(by, u);
-            prefetch(&self.blocks, self.block_at(chosen));
-        }
-    }
-
-    #[inline(always)]
-    fn choose_block(&self, by: impl CountKeys, u: [f32; 2]) -> ChosenBlock {
-        let row = self.rows.invert(by, 0, u[1]);
-        let column = self.columns.invert(by, row.index, u[0]);
-        ChosenBlock { x: column.index, y: row.index, within: [column.within, row.within], pmf: row.pmf * column.pmf }
-    }
-
-    #[inline]
-    fn block_at(&self, chosen: &ChosenBlock) -> usize {
-        chosen.y * self.columns.len + chosen.x
+    fn block_at(&self, x: usize, y: usize) -> usize {
+        y * self.columns.len() + x
     }
 
     /// The probability of a cell.
     #[inline]
     pub fn pmf(&self, x: usize, y: usize) -> f32 {
-        self.blocks[y / SIDE * self.columns.len + x / SIDE].pmf(x % SIDE, y % SIDE, self.block_pmf(x, y))
+        self.blocks[self.block_at(x / SIDE, y / SIDE)].pmf(x % SIDE, y % SIDE, self.block_pmf(x, y))
     }
 
     /// The probability of the block of a cell.
@@ -348,13 +178,14 @@ impl Piecewise2d {
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> PiecewiseSample {
         let cell = self.sample_cell(u);
-        let place = |i: usize, within: f32, n: usize| {
+        let place = |i: u32, within: f32, n: usize| {
+            let i = i as usize;
             let limit = |i: usize| (i as f64 / n as f64) as f32;
             let x = ((i as f64 + f64::from(within)) / n as f64) as f32;
             // Rounding must not carry the point into a neighbour of another density.
             x.clamp(limit(i), limit(i + 1).next_down())
         };
-        let uv = [place(cell.x, cell.within[0], self.width), place(cell.y, cell.within[1], self.height)];
+        let uv = [place(cell.x, cell.within.x, self.width), place(cell.y, cell.within.y, self.height)];
         PiecewiseSample { uv, pdf: self.density(cell.pmf) }
     }
 
@@ -385,7 +216,6 @@ impl Piecewise2d {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Rng;
 
     #[test]
     fn frequencies_equal_weights_and_densities_agree() {
@@ -434,24 +264,10 @@ mod tests {
             let density = Piecewise2d::new(9, 5, &weights).unwrap();
             for u in [[0.0, 0.0], [ONE_MINUS_EPSILON; 2], [0.0, ONE_MINUS_EPSILON], [0.3, 0.6]] {
                 let cell = density.sample_cell(u);
-                assert_eq!((cell.y * 9 + cell.x, cell.pmf), (hot, 1.0));
+                assert_eq!((cell.y * 9 + cell.x, cell.pmf), (hot as u32, 1.0));
                 let s = density.sample(u);
                 assert_eq!((s.pdf, density.pdf(s.uv)), (45.0, 45.0));
             }
-        }
-    }
-
-    #[test]
-    fn cells_of_a_batch_are_those_of_single_samples() {
-        let mut random = Rng::new(11);
-        let (width, height) = (1_300, 90);
-        let weights: Vec<f32> = (0..width * height).map(|_| random.unit_f32().powi(9)).collect();
-        let density = Piecewise2d::new(width, height, &weights).unwrap();
-        for _ in 0..50 {
-            let us: [[f32; 2]; 128] = std::array::from_fn(|_| [random.unit_f32(), random.unit_f32()]);
-            let mut cells = [PiecewiseCell::default(); 128];
-            density.sample_cells(&us, &mut cells);
-            assert_eq!(cells, us.map(|u| density.sample_cell(u)));
         }
     }
 
