@@ -1,7 +1,7 @@
 //! Choices for a batch of points at once.
 
-use super::cuts::{Cuts, PickedNode, ShadingPoint};
-use super::node::WIDTH;
+use super::cuts::{Cuts, PickedNode};
+use super::node::{Node, WIDTH};
 use super::pick::{pick, total};
 use super::{LEAF, LightTree, MAX_OPEN, TreeChoice};
 use crate::math::rows::{BATCH, Row, whole_vectors};
@@ -62,10 +62,28 @@ impl BatchCuts {
                 break;
             }
             self.level.count = count;
-            for j in 0..count {
-                let ShadingPoint { p, n } = self.cuts.points[self.level.points[j] as usize];
-                let of = tree.nodes[self.level.nodes[j] as usize].importances(p, n).of;
-                self.level.set_importances(j, &of);
+            self.weigh(tree);
+        }
+    }
+
+    /// Finds the importances of the level's nodes.
+    #[inline(always)]
+    fn weigh(&mut self, tree: &LightTree) {
+        let Self { cuts, level } = self;
+        for j in (0..level.count).step_by(2) {
+            // Of an odd number the last is computed twice.
+            let two = [j, (j + 1).min(level.count - 1)];
+            let points = two.map(|j| cuts.points[level.points[j] as usize]);
+            let nodes = two.map(|j| &tree.nodes[level.nodes[j] as usize]);
+            let mut importances = [0.0; 2 * WIDTH];
+            Node::weigh_two(
+                nodes,
+                points,
+                #[inline(always)]
+                |i, importance, _| importances[i] = importance,
+            );
+            for (j, of) in two.into_iter().zip(importances.as_chunks().0) {
+                level.set_importances(j, of);
             }
         }
     }

@@ -1,8 +1,10 @@
 //! Cuts of the tree.
 
-use super::node::WIDTH;
+use std::ops::Range;
+
+use super::node::{Node, WIDTH};
 use super::pick::total;
-use super::{LightTree, MAX_OPEN, NONE};
+use super::{LightTree, MAX_OPEN, NONE, ShadingPoint};
 use crate::math::Vec3;
 use crate::math::compact::ORDER_OF_8;
 use crate::math::float::ONE_MINUS_EPSILON;
@@ -23,18 +25,14 @@ pub(super) struct Cuts<const POINTS: usize, const NODES: usize> {
     pub node_points: [u32; NODES],
     pub node_count: usize,
     pub importances: [[f32; WIDTH]; NODES],
+    /// 1 for each child that is a near node, 0 for others.
+    near: [[u8; WIDTH]; NODES],
     /// Sums of the importances of the nodes before, of the same point.
     pub starts: [f64; NODES],
 }
 
 /// The cut of one point.
 pub(super) type OneCut = Cuts<1, { MAX_OPEN + WIDTH }>;
-
-#[derive(Clone, Copy)]
-pub(super) struct ShadingPoint {
-    pub p: Vec3,
-    pub n: Vec3,
-}
 
 impl<const POINTS: usize, const NODES: usize> Default for Cuts<POINTS, NODES> {
     fn default() -> Self {
@@ -48,6 +46,7 @@ impl<const POINTS: usize, const NODES: usize> Default for Cuts<POINTS, NODES> {
             node_points: [0; NODES],
             node_count: 0,
             importances: [[0.0; WIDTH]; NODES],
+            near: [[0; WIDTH]; NODES],
             starts: [0.0; NODES],
         }
     }
@@ -62,9 +61,9 @@ impl<const POINTS: usize, const NODES: usize> Cuts<POINTS, NODES> {
 
     /// Adds a point, with a number in `[0, 1)`.
     #[inline(always)]
-    pub fn push(&mut self, p: Vec3, n: Vec3, u: f64) {
+    pub fn push(&mut self, at: ShadingPoint, u: f64) {
         let point = self.count;
-        self.points[point] = ShadingPoint { p, n };
+        self.points[point] = at;
         self.u[point] = u;
         self.totals[point] = 0.0;
         self.open[point] = 1;
@@ -84,19 +83,53 @@ impl<const POINTS: usize, const NODES: usize> Cuts<POINTS, NODES> {
     /// Finds the cuts. Nodes of all points take turns: what one waits for, others do not.
     #[inline(always)]
     pub fn expand(&mut self, tree: &LightTree) {
+        let mut level = 0..self.node_count;
+        while !level.is_empty() {
+            let end = level.end;
+            self.weigh(tree, level.clone());
+            self.open_near_nodes(tree, level);
+            level = end..self.node_count;
+        }
+    }
+
+    /// Finds the importances of nodes, as if all near children could be in the cut. Nothing here depends on the node
+    /// before: several are computed at a time.
+    #[inline(always)]
+    fn weigh(&mut self, tree: &LightTree, nodes: Range<usize>) {
+        for i in nodes.clone().step_by(2) {
+            // Of an odd number the last is computed twice; the arrays have place for it.
+            let two = [i, (i + 1).min(nodes.end - 1)];
+            let points = two.map(|i| self.points[self.node_points[i] as usize]);
+            let two = two.map(|i| &tree.nodes[self.nodes[i] as usize]);
+            // Arrays of their own, which are known not to overlap.
+            let (mut importances, mut near) = ([0.0; 2 * WIDTH], [0; 2 * WIDTH]);
+            Node::weigh_two(
+                two,
+                points,
+                #[inline(always)]
+                |k, importance, is_near_node| {
+                    importances[k] = if is_near_node { 0.0 } else { importance };
+                    near[k] = u8::from(is_near_node);
+                },
+            );
+            self.importances.as_flattened_mut()[i * WIDTH..][..2 * WIDTH].copy_from_slice(&importances);
+            self.near.as_flattened_mut()[i * WIDTH..][..2 * WIDTH].copy_from_slice(&near);
+        }
+    }
+
+    /// Adds near children of nodes to the cut, where there is room.
+    #[inline(always)]
+    fn open_near_nodes(&mut self, tree: &LightTree, nodes: Range<usize>) {
         let mut node_count = self.node_count;
-        let mut i = 0;
-        while i < node_count {
+        for i in nodes {
             let point = self.node_points[i] as usize;
             let node = &tree.nodes[self.nodes[i] as usize];
-            let ShadingPoint { p, n } = self.points[point];
-            let mut found = node.importances(p, n);
             if node.first_node() != NONE {
-                let near = found.near_nodes();
+                // The product moves bit `8 i` to bit `56 + i`.
+                let near = u64::from_le_bytes(self.near[i]).wrapping_mul(0x0102_0408_1020_4080) >> 56;
                 let open = self.open[point] + near.count_ones();
                 if open <= MAX_OPEN as u32 {
                     self.open[point] = open;
-                    found.of = found.without_near_nodes;
                     // All children's indices are written, those of near nodes first; the arrays have place for them.
                     let order = ORDER_OF_8[near as usize].to_le_bytes();
                     let nodes: &mut [u32; WIDTH] = self.nodes[node_count..].first_chunk_mut().unwrap();
@@ -106,12 +139,12 @@ impl<const POINTS: usize, const NODES: usize> Cuts<POINTS, NODES> {
                     let points: &mut [u32; WIDTH] = self.node_points[node_count..].first_chunk_mut().unwrap();
                     *points = [point as u32; WIDTH];
                     node_count += near.count_ones() as usize;
+                } else {
+                    self.importances[i] = node.importances(self.points[point]);
                 }
             }
-            self.importances[i] = found.of;
             self.starts[i] = self.totals[point];
-            self.totals[point] += f64::from(total(&found.of));
-            i += 1;
+            self.totals[point] += f64::from(total(&self.importances[i]));
         }
         self.node_count = node_count;
     }

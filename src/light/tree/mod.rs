@@ -50,6 +50,13 @@ impl LightSampleContext {
     }
 }
 
+/// As [`LightSampleContext`], for the tree.
+#[derive(Clone, Copy)]
+struct ShadingPoint {
+    p: Vec3,
+    n: Vec3,
+}
+
 /// A light chosen by the tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct TreeChoice {
@@ -80,12 +87,12 @@ impl LightTree {
     /// A light, `u` in `[0, 1)`; `None` where nothing arrives.
     #[inline]
     pub fn choose(&self, from: &LightSampleContext, u: f64) -> Option<TreeChoice> {
-        vectorize!(choose(self, from.p.as_vec3(), from.n, u))
+        vectorize!(choose(self, ShadingPoint { p: from.p.as_vec3(), n: from.n }, u))
     }
 
     /// The probability with which [`choose`](Self::choose) finds a light.
     pub fn pmf(&self, from: &LightSampleContext, light: u32) -> f32 {
-        vectorize!(pmf(self, from.p.as_vec3(), from.n, light))
+        vectorize!(pmf(self, ShadingPoint { p: from.p.as_vec3(), n: from.n }, light))
     }
 
     /// Bytes of the tables.
@@ -98,13 +105,13 @@ impl LightTree {
 }
 
 #[inline(always)]
-fn choose(tree: &LightTree, p: Vec3, n: Vec3, u: f64) -> Option<TreeChoice> {
+fn choose(tree: &LightTree, point: ShadingPoint, u: f64) -> Option<TreeChoice> {
     let u = u.min(f64::from(ONE_MINUS_EPSILON));
     let (mut node, mut importances, mut u, mut pmf) = if tree.nodes.len() == 1 {
-        (0, tree.nodes[0].importances(p, n).of, u, 1.0)
+        (0, tree.nodes[0].importances(point), u, 1.0)
     } else {
         let mut cut = OneCut::default();
-        cut.push(p, n, u);
+        cut.push(point, u);
         cut.expand(tree);
         let (i, picked) = cut.pick();
         (cut.nodes[i], cut.importances[i], picked.share, picked.pmf)
@@ -119,21 +126,21 @@ fn choose(tree: &LightTree, p: Vec3, n: Vec3, u: f64) -> Option<TreeChoice> {
         if node & LEAF != 0 {
             return Some(TreeChoice { light: node & !LEAF, pmf });
         }
-        (importances, u) = (tree.nodes[node as usize].importances(p, n).of, picked.share);
+        (importances, u) = (tree.nodes[node as usize].importances(point), picked.share);
     }
 }
 
 #[inline(always)]
-fn pmf(tree: &LightTree, p: Vec3, n: Vec3, light: u32) -> f32 {
+fn pmf(tree: &LightTree, point: ShadingPoint, light: u32) -> f32 {
     let Place { mut node, mut slot } = tree.light_places[light as usize];
     if node == NONE {
         return 0.0;
     }
     if tree.nodes.len() == 1 {
-        return pmf_of_child(&tree.nodes[0].importances(p, n).of, slot);
+        return pmf_of_child(&tree.nodes[0].importances(point), slot);
     }
     let mut cut = OneCut::default();
-    cut.push(p, n, 0.0);
+    cut.push(point, 0.0);
     cut.expand(tree);
     let mut pmf = 1.0;
     // Up to the cut, which holds the root.
@@ -141,7 +148,7 @@ fn pmf(tree: &LightTree, p: Vec3, n: Vec3, light: u32) -> f32 {
         if let Some(importances) = cut.find(node) {
             return pmf * pmf_of_child(importances, slot) * node_pmf(total(importances), cut.totals[0]);
         }
-        pmf *= pmf_of_child(&tree.nodes[node as usize].importances(p, n).of, slot);
+        pmf *= pmf_of_child(&tree.nodes[node as usize].importances(point), slot);
         Place { node, slot } = tree.node_places[node as usize];
     }
 }

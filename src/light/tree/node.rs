@@ -1,6 +1,6 @@
 //! Nodes: bounds of eight children in lanes, and the estimate of what each gives at a point.
 
-use super::{LEAF, NONE};
+use super::{LEAF, NONE, ShadingPoint};
 use crate::light::bounds::LightBounds;
 use crate::math::Vec3;
 
@@ -24,25 +24,28 @@ const LARGEST: f32 = f32::MAX * f32::EPSILON;
 /// error times time is least between 1 and 2.
 const NEAR: f32 = 1.5;
 
-/// One number of each child.
-type Lanes = [f32; WIDTH];
-
-/// Bounds of eight children, side by side.
+/// Eight children.
 #[derive(Clone, Debug)]
 pub(super) struct Node {
-    center: [Lanes; 3],
-    inverse_radius: Lanes,
-    axis: [Lanes; 3],
-    /// Cosine and sine of the normals' spread.
-    cos_spread: Lanes,
-    sin_spread: Lanes,
-    /// Cosine of the reach of emission, less [`SLACK`].
-    cos_reach: Lanes,
-    /// Zero where there is no child. Negative for a child that emits both ways.
-    intensity: Lanes,
-    /// A node, or [`LEAF`] and a light.
-    child: [u32; WIDTH],
+    bounds: Bounds<WIDTH>,
     first_node: u32,
+}
+
+/// Bounds of children, side by side.
+#[derive(Clone, Debug)]
+struct Bounds<const N: usize> {
+    center: [[f32; N]; 3],
+    inverse_radius: [f32; N],
+    axis: [[f32; N]; 3],
+    /// Cosine and sine of the normals' spread.
+    cos_spread: [f32; N],
+    sin_spread: [f32; N],
+    /// Cosine of the reach of emission, less [`SLACK`].
+    cos_reach: [f32; N],
+    /// Zero where there is no child. Negative for a child that emits both ways.
+    intensity: [f32; N],
+    /// A node, or [`LEAF`] and a light.
+    child: [u32; N],
 }
 
 /// What is known of one child.
@@ -55,43 +58,84 @@ pub(super) struct ChildBounds {
     sin_spread: f32,
     cos_reach: f32,
     intensity: f32,
-}
-
-/// What the children of a node give at a point.
-pub(super) struct Importances {
-    /// Estimates of the irradiance, up to a common factor; zero only where none can arrive.
-    pub of: [f32; WIDTH],
-    /// The same without near nodes.
-    pub without_near_nodes: [f32; WIDTH],
-    /// 1 for each child that is a node, of which something arrives, and so near that one estimate for all of it is a
-    /// poor one; 0 for others.
-    near: [u8; WIDTH],
-}
-
-impl Importances {
-    /// A bit for each near node.
-    #[inline(always)]
-    pub fn near_nodes(&self) -> u32 {
-        // The product moves bit `8 i` to bit `56 + i`.
-        (u64::from_le_bytes(self.near).wrapping_mul(0x0102_0408_1020_4080) >> 56) as u32
-    }
+    child: u32,
 }
 
 impl Node {
-    pub const EMPTY: Self = Self {
-        center: [[0.0; WIDTH]; 3],
-        inverse_radius: [0.0; WIDTH],
-        axis: [[0.0; WIDTH]; 3],
-        cos_spread: [1.0; WIDTH],
-        sin_spread: [0.0; WIDTH],
-        cos_reach: [0.0; WIDTH],
-        intensity: [0.0; WIDTH],
-        child: [NONE; WIDTH],
-        first_node: NONE,
-    };
+    pub const EMPTY: Self = Self { bounds: Bounds::EMPTY, first_node: NONE };
 
     /// Sets a child.
     pub fn set(&mut self, slot: usize, bounds: &LightBounds, child: u32) {
+        self.bounds.set(slot, bounds, child);
+        if child & LEAF == 0 {
+            self.first_node = self.first_node.min(child);
+        }
+    }
+
+    /// A node, or [`LEAF`] and a light.
+    #[inline(always)]
+    pub fn child(&self, slot: usize) -> u32 {
+        self.bounds.child[slot]
+    }
+
+    /// How many children there are.
+    #[inline(always)]
+    pub fn count(&self) -> usize {
+        self.bounds.child.iter().position(|&child| child == NONE).unwrap_or(WIDTH)
+    }
+
+    /// The first of the children that are nodes, one after the other, or none.
+    #[inline(always)]
+    pub fn first_node(&self) -> u32 {
+        self.first_node
+    }
+
+    /// What is known of a child.
+    #[inline(always)]
+    pub fn bounds(&self, slot: usize) -> ChildBounds {
+        self.bounds.get(slot)
+    }
+
+    /// What each child gives at a point: estimates of the irradiance, up to a common factor; zero only where none can
+    /// arrive.
+    #[inline(always)]
+    pub fn importances(&self, point: ShadingPoint) -> [f32; WIDTH] {
+        let mut importances = [0.0; WIDTH];
+        self.bounds.weigh(
+            |_| point,
+            #[inline(always)]
+            |i, importance, _| importances[i] = importance,
+        );
+        importances
+    }
+
+    /// Gives the importance of each child of two nodes to `set`, with its index (those of the second after those of the
+    /// first) and whether it is a near node: one of which something arrives, and so near that one estimate for all of it
+    /// is a poor one. A node alone would wait for one operation after another, and be half of a vector of AVX-512.
+    #[inline(always)]
+    pub fn weigh_two(nodes: [&Self; 2], [a, b]: [ShadingPoint; 2], set: impl FnMut(usize, f32, bool)) {
+        // Not by an index, which would gather.
+        Bounds::of_two(nodes.map(|node| &node.bounds)).weigh(
+            #[inline(always)]
+            |i| if i < WIDTH { a } else { b },
+            set,
+        );
+    }
+}
+
+impl<const N: usize> Bounds<N> {
+    const EMPTY: Self = Self {
+        center: [[0.0; N]; 3],
+        inverse_radius: [0.0; N],
+        axis: [[0.0; N]; 3],
+        cos_spread: [1.0; N],
+        sin_spread: [0.0; N],
+        cos_reach: [0.0; N],
+        intensity: [0.0; N],
+        child: [NONE; N],
+    };
+
+    fn set(&mut self, slot: usize, bounds: &LightBounds, child: u32) {
         let center = bounds.bounds.center();
         let reach = (bounds.bounds.max - center).max(center - bounds.bounds.min);
         let axis = bounds.cone.axis;
@@ -105,33 +149,11 @@ impl Node {
         self.cos_reach[slot] = bounds.cone.reach.cos() - SLACK;
         self.intensity[slot] = if bounds.two_sided { -bounds.intensity } else { bounds.intensity };
         self.child[slot] = child;
-        if child & LEAF == 0 {
-            self.first_node = self.first_node.min(child);
-        }
     }
 
-    /// A node, or [`LEAF`] and a light.
     #[inline(always)]
-    pub fn child(&self, slot: usize) -> u32 {
-        self.child[slot]
-    }
-
-    /// How many children there are.
-    #[inline(always)]
-    pub fn count(&self) -> usize {
-        self.child.iter().position(|&child| child == NONE).unwrap_or(WIDTH)
-    }
-
-    /// The first of the children that are nodes, one after the other, or none.
-    #[inline(always)]
-    pub fn first_node(&self) -> u32 {
-        self.first_node
-    }
-
-    /// What is known of a child.
-    #[inline(always)]
-    pub fn bounds(&self, slot: usize) -> ChildBounds {
-        let vector = |rows: &[Lanes; 3]| Vec3::new(rows[0][slot], rows[1][slot], rows[2][slot]);
+    fn get(&self, slot: usize) -> ChildBounds {
+        let vector = |rows: &[[f32; N]; 3]| Vec3::new(rows[0][slot], rows[1][slot], rows[2][slot]);
         ChildBounds {
             center: vector(&self.center),
             inverse_radius: self.inverse_radius[slot],
@@ -140,29 +162,47 @@ impl Node {
             sin_spread: self.sin_spread[slot],
             cos_reach: self.cos_reach[slot],
             intensity: self.intensity[slot],
+            child: self.child[slot],
         }
     }
 
-    /// What each child gives at `p` on a surface with the normal `n`, or (if that is zero) from any side.
     #[inline(always)]
-    pub fn importances(&self, p: Vec3, n: Vec3) -> Importances {
-        let (mut of, mut without_near_nodes, mut near) = ([0.0; WIDTH], [0.0; WIDTH], [0; WIDTH]);
-        let from_any_side = n == Vec3::ZERO;
-        for i in 0..WIDTH {
-            let (importance, is_near) = self.bounds(i).importance(p, n, from_any_side);
-            of[i] = importance;
-            let is_near_node = is_near & (importance > 0.0) & (self.child[i] & LEAF == 0);
-            without_near_nodes[i] = if is_near_node { 0.0 } else { importance };
-            near[i] = u8::from(is_near_node);
+    fn weigh(&self, point: impl Fn(usize) -> ShadingPoint, mut set: impl FnMut(usize, f32, bool)) {
+        for i in 0..N {
+            let (importance, is_near_node) = self.get(i).importance(point(i));
+            set(i, importance, is_near_node);
         }
-        Importances { of, without_near_nodes, near }
     }
 }
 
-impl ChildBounds {
-    /// What the child gives, as [`Importances`] has it, and whether it is near; without branches.
+impl Bounds<{ 2 * WIDTH }> {
     #[inline(always)]
-    pub fn importance(&self, p: Vec3, n: Vec3, from_any_side: bool) -> (f32, bool) {
+    fn of_two([a, b]: [&Bounds<WIDTH>; 2]) -> Self {
+        Self {
+            center: [0, 1, 2].map(|k| both(a.center[k], b.center[k])),
+            inverse_radius: both(a.inverse_radius, b.inverse_radius),
+            axis: [0, 1, 2].map(|k| both(a.axis[k], b.axis[k])),
+            cos_spread: both(a.cos_spread, b.cos_spread),
+            sin_spread: both(a.sin_spread, b.sin_spread),
+            cos_reach: both(a.cos_reach, b.cos_reach),
+            intensity: both(a.intensity, b.intensity),
+            child: both(a.child, b.child),
+        }
+    }
+}
+
+#[inline(always)]
+fn both<T: Copy + Default>(a: [T; WIDTH], b: [T; WIDTH]) -> [T; 2 * WIDTH] {
+    let mut both = [T::default(); 2 * WIDTH];
+    both[..WIDTH].copy_from_slice(&a);
+    both[WIDTH..].copy_from_slice(&b);
+    both
+}
+
+impl ChildBounds {
+    /// What the child gives, as [`Node::weigh_two`] has it; without branches.
+    #[inline(always)]
+    pub fn importance(&self, ShadingPoint { p, n }: ShadingPoint) -> (f32, bool) {
         let [x, y, z] = [self.center.x - p.x, self.center.y - p.y, self.center.z - p.z];
         let (inverse_radius, intensity) = (self.inverse_radius, self.intensity);
         let distance_squared = larger(x * x + y * y + z * z, f32::MIN_POSITIVE);
@@ -191,13 +231,14 @@ impl ChildBounds {
 
         // The angle between arrival and the receiver's normal.
         let cos_arrival = (x * n.x + y * n.y + z * n.z) * inverse_distance;
-        let cos_arrival = if from_any_side { 1.0 } else { cos_arrival };
+        let cos_arrival = if n == Vec3::ZERO { 1.0 } else { cos_arrival };
         let arrival = if cos_arrival + sin_bound < -SLACK { 0.0 } else { mean(cos_arrival) };
 
         let inverse_radius_squared = inverse_radius * inverse_radius;
-        let near = distance_squared * inverse_radius_squared < NEAR;
         let inverse_square = smaller(inverse_distance * inverse_distance, 2.0 * inverse_radius_squared);
-        (smaller(intensity.abs() * emission * arrival * inverse_square, LARGEST), near)
+        let importance = smaller(intensity.abs() * emission * arrival * inverse_square, LARGEST);
+        let is_near = distance_squared * inverse_radius_squared < NEAR;
+        (importance, is_near & (importance > 0.0) & (self.child & LEAF == 0))
     }
 }
 

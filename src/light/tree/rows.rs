@@ -3,10 +3,9 @@
 use super::batch::BatchCuts;
 use super::node::Node;
 use super::pick::{Picked, pick, pick_of_two};
-use super::{LEAF, LightTree};
+use super::{LEAF, LightTree, ShadingPoint};
 use crate::light::LightQueries;
 use crate::light::set::{LightChoiceRows, with_digits};
-use crate::math::Vec3;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::rows::{BATCH, Row, whole_vectors};
 use crate::math::vectorize::vectorize;
@@ -48,7 +47,7 @@ impl LightTree {
             let u = with_digits([u, digits]);
             if u < f64::from(share) {
                 let u = (u / f64::from(share)).min(f64::from(ONE_MINUS_EPSILON));
-                batch.cuts.push(queries.points.get(lane).as_vec3(), queries.normals.get(lane), u);
+                batch.cuts.push(point(queries, lane), u);
                 lanes.push(lane);
             }
         }
@@ -58,6 +57,11 @@ impl LightTree {
             choices.pmf[lane] = choice.pmf * share;
         }));
     }
+}
+
+#[inline(always)]
+fn point(queries: &LightQueries, lane: usize) -> ShadingPoint {
+    ShadingPoint { p: queries.points.get(lane).as_vec3(), n: queries.normals.get(lane) }
 }
 
 /// Chooses among the children of a root, which are all lights: up to `CHILDREN` of them.
@@ -75,8 +79,7 @@ fn choose<const CHILDREN: usize>(
     for (slot, importances) in importances.iter_mut().enumerate().take(node.count()) {
         let bounds = node.bounds(slot);
         for (i, importance) in importances.iter_mut().enumerate().take(count) {
-            let (p, n) = (queries.points.get(i).as_vec3(), queries.normals.get(i));
-            *importance = bounds.importance(p, n, n == Vec3::ZERO).0;
+            *importance = bounds.importance(point(queries, i)).0;
         }
     }
     for i in 0..count {
