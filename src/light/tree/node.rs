@@ -110,8 +110,8 @@ impl Node {
     }
 
     /// Gives the importance of each child of two nodes to `set`, with its index (those of the second after those of the
-    /// first) and whether it is a near node: one of which something arrives, and so near that one estimate for all of it
-    /// is a poor one. A node alone would wait for one operation after another, and be half of a vector of AVX-512.
+    /// first) and whether it is a near node: one of which something arrives, and so near that one estimate for all of
+    /// it is a poor one. A node alone would wait for one operation after another, and be half of a vector of AVX-512.
     #[inline(always)]
     pub fn weigh_two(nodes: [&Self; 2], [a, b]: [ShadingPoint; 2], set: impl FnMut(usize, f32, bool)) {
         // Not by an index, which would gather.
