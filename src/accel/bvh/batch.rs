@@ -1,9 +1,10 @@
 //! Interleaved traversal of the wide hierarchy: while the memory that one ray needs is on its way, others advance.
 //!
 //! Rays are prepared in rows. Then up to [`SLOTS`] are traversed at once: a round opens a node for each ray that is
-//! at one, and tests a leaf for each ray that is at one, so that few branches depend on single rays; what a ray needs
-//! in the next round is prefetched. A ray that meets an instance goes on in the object's hierarchy, until the entry on
-//! its stack that returns it to the world's. Answers are those of single rays, bit for bit.
+//! at one, and tests a leaf for each ray that is at one. Loops without branches compute, and others take what they found
+//! from memory: a branch right after a long chain of operations would be known to be wrong only at its end. What a ray
+//! needs in the next round is prefetched. A ray that meets an instance goes on in the object's hierarchy, until the
+//! entry on its stack that returns it to the world's. Answers are those of single rays, bit for bit.
 
 use std::cell::RefCell;
 use std::hint::select_unpredictable;
@@ -12,8 +13,8 @@ use super::Bvh;
 use super::any_hit_order::{AnyHitOrder, MeasuredOrders};
 use super::best_hits::BestHits;
 use super::coherent::{Occupancy, PacketStack};
-use super::lanes::{SimdIsa, WideRay};
-use super::wide::{Block, Child, ChildKind, Entry, STACK, WIDTH, Wide, WideNode};
+use super::lanes::{BlockHits, SimdIsa, WideRay};
+use super::wide::{Child, Entry, STACK, WIDTH, Wide, WideNode};
 use crate::accel::inspect::{Item, ItemKind};
 use crate::accel::tree::{Answers, Batch, SlabRay, SlabRows};
 use crate::geometry::{Hit, Shear, ShearRows, TriangleHit, TriangleRay, largest_axis};
@@ -51,6 +52,8 @@ pub(super) struct Scratch {
     pub keys: Row<u32>,
     /// The node or leaf that each ray visits next.
     next: [Child; BATCH],
+    /// On the triangles that each ray is at.
+    hits: [BlockHits; SLOTS],
     stacks: [Stack; SLOTS],
     any_hit_orders: MeasuredOrders,
 }
@@ -75,6 +78,7 @@ impl Default for Scratch {
             t_max: [0.0; BATCH],
             keys: [0; BATCH],
             next: [Child::ROOT; BATCH],
+            hits: [BlockHits::NONE; SLOTS],
             stacks: [Stack { entries: [Entry::NONE; MAX_ENTRIES], len: 0 }; SLOTS],
             any_hit_orders: MeasuredOrders::default(),
         }
@@ -180,12 +184,8 @@ impl Stack {
     }
 }
 
-/// Which slots have a ray at a node, and which at a leaf.
-#[derive(Clone, Copy, Default)]
-struct Places {
-    nodes: u32,
-    leaves: u32,
-}
+/// Which slots have a ray at a node, at triangles, and at other items: a bit for each slot, by [`Child::tag`].
+type Places = [u32; 4];
 
 /// The hierarchy that a ray is in: that of the world, or of an object.
 #[derive(Clone, Copy)]
@@ -213,7 +213,7 @@ pub(super) fn trace<'r, L: SimdIsa, const ANY: bool, const INSTANCES: bool>(
         scratch,
         answers,
         any_hit_order,
-        places: Places::default(),
+        places: [0; 4],
         ended: u32::MAX,
     };
     let mut steps = 0;
@@ -227,18 +227,17 @@ pub(super) fn trace<'r, L: SimdIsa, const ANY: bool, const INSTANCES: bool>(
             if INSTANCES {
                 tracer.spaces[slot] = world;
             }
-            tracer.places.nodes |= 1 << slot;
+            tracer.places[Child::ROOT.tag()] |= 1 << slot;
         }
-        let now = std::mem::take(&mut tracer.places);
-        if now.nodes | now.leaves == 0 {
+        let [nodes, blocks, items, _] = std::mem::take(&mut tracer.places);
+        if nodes | blocks | items == 0 {
             break;
         }
-        steps += now.nodes.count_ones() + now.leaves.count_ones();
-        for slot in set_bits(now.nodes) {
-            tracer.open::<L, ANY>(lanes, slot, lane_of[slot] % BATCH);
-        }
-        for slot in set_bits(now.leaves) {
-            tracer.test_leaf::<L, ANY>(lanes, slot, lane_of[slot] % BATCH);
+        steps += nodes.count_ones() + blocks.count_ones() + items.count_ones();
+        tracer.open_nodes::<L, ANY>(lanes, nodes, &lane_of);
+        tracer.test_blocks::<L, ANY>(lanes, blocks, &lane_of);
+        for slot in set_bits(items) {
+            tracer.test_items::<ANY>(slot, lane_of[slot] % BATCH);
         }
     }
     if ANY {
@@ -283,6 +282,17 @@ impl<'r, A: Answers, const INSTANCES: bool> Tracer<'_, 'r, '_, A, INSTANCES> {
         if self.is_in_object(slot) { &self.scratch.in_object } else { &self.scratch.prepared }
     }
 
+    /// Opens the nodes that rays are at, and goes on with all of them.
+    #[inline(always)]
+    fn open_nodes<L: SimdIsa, const ANY: bool>(&mut self, lanes: L, slots: u32, lane_of: &[usize; SLOTS]) {
+        for slot in set_bits(slots) {
+            self.open::<L, ANY>(lanes, slot, lane_of[slot] % BATCH);
+        }
+        for slot in set_bits(slots) {
+            self.advance(slot, lane_of[slot] % BATCH);
+        }
+    }
+
     /// Opens the node that a ray is at.
     #[inline(always)]
     fn open<L: SimdIsa, const ANY: bool>(&mut self, lanes: L, slot: usize, lane: usize) {
@@ -300,47 +310,60 @@ impl<'r, A: Answers, const INSTANCES: bool> Tracer<'_, 'r, '_, A, INSTANCES> {
         };
         let (entries, count) = lanes.ordered(enter, order, &node.children);
         self.scratch.stacks[slot].push(entries, count);
-        self.advance(slot, lane);
     }
 
-    /// Tests the leaf that a ray is at.
+    /// Tests the triangles that rays are at, and goes on with those that are not answered.
     #[inline(always)]
-    fn test_leaf<L: SimdIsa, const ANY: bool>(&mut self, lanes: L, slot: usize, lane: usize) {
-        let wide = self.space(slot).wide;
-        let is_answered = match self.scratch.next[lane].kind() {
-            ChildKind::Blocks { first, count } => {
-                let mut is_answered = false;
-                for block in &wide.blocks[first as usize..(first + count) as usize] {
-                    if self.test_block::<L, ANY>(lanes, block, slot, lane) {
-                        is_answered = true;
-                        break;
-                    }
-                }
-                is_answered
+    fn test_blocks<L: SimdIsa, const ANY: bool>(&mut self, lanes: L, slots: u32, lane_of: &[usize; SLOTS]) {
+        let mut rest = slots;
+        let mut index = 0;
+        while rest != 0 {
+            let (mut hit, mut more) = (0, 0);
+            for slot in set_bits(rest) {
+                let lane = lane_of[slot] % BATCH;
+                let (first, count) = self.scratch.next[lane].run_of_items();
+                let block = &self.space(slot).wide.blocks[first + index];
+                let hits = lanes.intersect(block, &self.triangle_ray(slot, lane));
+                hit |= u32::from(hits.mask != 0) << slot;
+                more |= u32::from(index + 1 < count) << slot;
+                self.scratch.hits[slot] = hits;
             }
-            ChildKind::Items { first, count } => {
-                let items = &wide.items[first as usize..(first + count) as usize];
-                if ANY && self.is_end_shape(items, slot, lane) {
-                    false
-                } else if INSTANCES
-                    && let [item] = items
-                    && let ItemKind::Instance(id) = item.kind()
-                {
-                    if self.enter(id, slot, lane) {
-                        return;
-                    }
-                    false
-                } else {
-                    let (ray, triangle_ray) = (self.ray(slot, lane), self.triangle_ray(slot, lane));
-                    let instance = self.space(slot).instance;
-                    let Scratch { keys, t_max, .. } = &mut *self.scratch;
-                    let mut best = BestHits { accel: self.batch.accel, keys, t_max, answers: &mut *self.answers };
-                    best.test_items::<ANY>(lane, items, instance, &ray, triangle_ray)
+            for slot in set_bits(hit) {
+                if self.offer::<ANY>(slot, lane_of[slot] % BATCH, index) {
+                    self.ended |= 1 << slot;
                 }
             }
-            ChildKind::Node(_) | ChildKind::Leave => false,
-        };
-        if is_answered {
+            rest = more & !self.ended;
+            index += 1;
+        }
+        for slot in set_bits(slots & !self.ended) {
+            self.advance(slot, lane_of[slot] % BATCH);
+        }
+    }
+
+    /// Tests the items other than triangles that a ray is at, and goes on if it is not answered.
+    #[inline(always)]
+    fn test_items<const ANY: bool>(&mut self, slot: usize, lane: usize) {
+        let (first, count) = self.scratch.next[lane].run_of_items();
+        let items = &self.space(slot).wide.items[first..first + count];
+        if ANY && self.is_end_shape(items, slot, lane) {
+            self.advance(slot, lane);
+            return;
+        }
+        if INSTANCES
+            && let [item] = items
+            && let ItemKind::Instance(id) = item.kind()
+        {
+            if !self.enter(id, slot, lane) {
+                self.advance(slot, lane);
+            }
+            return;
+        }
+        let (ray, triangle_ray) = (self.ray(slot, lane), self.triangle_ray(slot, lane));
+        let instance = self.space(slot).instance;
+        let Scratch { keys, t_max, .. } = &mut *self.scratch;
+        let mut best = BestHits { accel: self.batch.accel, keys, t_max, answers: &mut *self.answers };
+        if best.test_items::<ANY>(lane, items, instance, &ray, triangle_ray) {
             self.ended |= 1 << slot;
         } else {
             self.advance(slot, lane);
@@ -372,7 +395,7 @@ impl<'r, A: Answers, const INSTANCES: bool> Tracer<'_, 'r, '_, A, INSTANCES> {
         scratch.stacks[slot].push_leave();
         scratch.next[lane] = Child::ROOT;
         self.spaces[slot] = Space { wide, instance: id };
-        self.places.nodes |= 1 << slot;
+        self.places[Child::ROOT.tag()] |= 1 << slot;
         prefetch_lines(address(&wide.nodes, 0), PREFETCHED_LINES);
         true
     }
@@ -391,13 +414,11 @@ impl<'r, A: Answers, const INSTANCES: bool> Tracer<'_, 'r, '_, A, INSTANCES> {
             self.spaces[slot] = self.world;
         };
         self.scratch.next[lane] = child;
-        let is_node = child.is_node();
-        self.places.nodes |= u32::from(is_node) << slot;
-        self.places.leaves |= u32::from(!is_node) << slot;
+        self.places[child.tag()] |= 1 << slot;
         // Without a branch, which would be wrong half of the time. Of other items, an address that is not used.
         let wide = self.space(slot).wide;
         let (node, block) = (address(&wide.nodes, child.node_index()), address(&wide.blocks, child.first()));
-        prefetch_lines(select_unpredictable(is_node, node, block), PREFETCHED_LINES);
+        prefetch_lines(select_unpredictable(child.is_node(), node, block), PREFETCHED_LINES);
     }
 
     #[inline(always)]
@@ -405,13 +426,13 @@ impl<'r, A: Answers, const INSTANCES: bool> Tracer<'_, 'r, '_, A, INSTANCES> {
         self.prepared(slot).triangle_ray(lane, self.batch.rays, self.scratch.t_max[lane])
     }
 
-    /// Tests up to four triangles. True if the ray is answered.
+    /// Takes the hits on the triangles that a ray is at. True if it is answered.
     #[inline(always)]
-    fn test_block<L: SimdIsa, const ANY: bool>(&mut self, lanes: L, block: &Block, slot: usize, lane: usize) -> bool {
-        let ray = self.triangle_ray(slot, lane);
-        let Some(hits) = lanes.intersect(block, &ray) else { return false };
-        let (instance, is_in_object) = (self.space(slot).instance, self.is_in_object(slot));
-        let Scratch { keys, t_max, object_rays, .. } = &mut *self.scratch;
+    fn offer<const ANY: bool>(&mut self, slot: usize, lane: usize, index: usize) -> bool {
+        let (instance, is_in_object, wide) =
+            (self.space(slot).instance, self.is_in_object(slot), self.space(slot).wide);
+        let Scratch { next, hits, keys, t_max, object_rays, .. } = &mut *self.scratch;
+        let (block, hits) = (&wide.blocks[next[lane].run_of_items().0 + index], &hits[slot]);
         let rays = if is_in_object { object_rays } else { self.batch.rays };
         let mut best = BestHits { accel: self.batch.accel, keys, t_max, answers: &mut *self.answers };
         for i in set_bits(hits.mask) {

@@ -27,6 +27,7 @@ impl WideRay {
 }
 
 /// Which triangles of a block are hit, where.
+#[repr(align(32))]
 pub(super) struct BlockHits {
     pub mask: u32,
     t: [f64; BLOCK],
@@ -35,6 +36,8 @@ pub(super) struct BlockHits {
 }
 
 impl BlockHits {
+    pub const NONE: Self = Self { mask: 0, t: [0.0; BLOCK], edges: [[0.0; BLOCK]; 3] };
+
     /// The hit on the triangle in a lane.
     #[inline(always)]
     pub fn get(&self, lane: usize) -> TriangleHit {
@@ -52,9 +55,8 @@ pub(super) trait SimdIsa: Copy {
     /// The children that are entered, in an order as [`WideNode::orders`] has them, then others; and how many are.
     fn ordered(self, enter: [f32; WIDTH], order: u32, children: &[Child; WIDTH]) -> ([Entry; WIDTH], u32);
 
-    /// [`TriangleRay::intersect`] for each triangle, with the very same operations; `None` if no lane passes the edge
-    /// tests.
-    fn intersect(self, block: &Block, ray: &TriangleRay) -> Option<BlockHits>;
+    /// [`TriangleRay::intersect`] for each triangle, with the very same operations.
+    fn intersect(self, block: &Block, ray: &TriangleRay) -> BlockHits;
 }
 
 /// Plain Rust.
@@ -99,8 +101,8 @@ impl SimdIsa for Portable {
     }
 
     #[inline(always)]
-    fn intersect(self, block: &Block, ray: &TriangleRay) -> Option<BlockHits> {
-        let mut hits = BlockHits { mask: 0, t: [0.0; BLOCK], edges: [[0.0; BLOCK]; 3] };
+    fn intersect(self, block: &Block, ray: &TriangleRay) -> BlockHits {
+        let mut hits = BlockHits::NONE;
         let (axes, shear) = (ray.axes(), &ray.shear);
         for lane in 0..BLOCK {
             let corner = |c: usize| DVec3::from(axes.map(|axis| f64::from(block.corners[c][axis][lane])));
@@ -116,7 +118,7 @@ impl SimdIsa for Portable {
                 row[lane] = value;
             }
         }
-        (hits.mask != 0).then_some(hits)
+        hits
     }
 }
 
@@ -170,7 +172,7 @@ impl SimdIsa for V3 {
     }
 
     #[inline(always)]
-    fn intersect(self, block: &Block, ray: &TriangleRay) -> Option<BlockHits> {
+    fn intersect(self, block: &Block, ray: &TriangleRay) -> BlockHits {
         let x = self.avx;
         let (axes, shear) = (ray.axes(), &ray.shear);
         let a = Corner::new(self, &block.corners[0], axes, shear);
@@ -184,9 +186,6 @@ impl SimdIsa for V3 {
         let outside =
             x._mm256_and_pd(x._mm256_cmp_pd::<_CMP_LT_OQ>(lowest, zero), x._mm256_cmp_pd::<_CMP_GT_OQ>(highest, zero));
         let candidates = !x._mm256_movemask_pd(outside) & 15;
-        if candidates == 0 {
-            return None;
-        }
         let determinant = x._mm256_add_pd(x._mm256_add_pd(u, v), w);
         let sum =
             x._mm256_add_pd(x._mm256_add_pd(x._mm256_mul_pd(u, a.z), x._mm256_mul_pd(v, b.z)), x._mm256_mul_pd(w, c.z));
@@ -197,10 +196,7 @@ impl SimdIsa for V3 {
         );
         let regular = x._mm256_cmp_pd::<_CMP_NEQ_UQ>(determinant, zero);
         let mask = (candidates & x._mm256_movemask_pd(x._mm256_and_pd(inside, regular))) as u32;
-        if mask == 0 {
-            return None;
-        }
-        Some(BlockHits { mask, t: pulp::cast(t), edges: pulp::cast([v, w, determinant]) })
+        BlockHits { mask, t: pulp::cast(t), edges: pulp::cast([v, w, determinant]) }
     }
 }
 

@@ -85,9 +85,8 @@ fn assert_same_triangle_hits(lanes: impl SimdIsa) {
         let expected: Vec<_> = triangles.iter().map(|t| ray.intersect(t)).collect();
         let found = lanes.intersect(&block, &ray);
         for (lane, expected) in expected.iter().enumerate() {
-            let found = found.as_ref().filter(|hits| hits.mask >> lane & 1 == 1);
             let bits = |h: TriangleHit| [h.t, h.u, h.v].map(f32::to_bits);
-            let found = found.map(|hits| bits(hits.get(lane)));
+            let found = (found.mask >> lane & 1 == 1).then(|| bits(found.get(lane)));
             assert_eq!(found, expected.map(bits), "{ray:?} {:?}", triangles[lane]);
         }
         hits += expected.iter().flatten().count();

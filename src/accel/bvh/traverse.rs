@@ -98,7 +98,7 @@ fn test_block<L: SimdIsa, C: Counter, const ANY: bool>(
     query: &mut Query<'_, Bvh, C, ANY>,
 ) -> bool {
     query.counter.prims(block.count);
-    let Some(hits) = lanes.intersect(block, &query.triangle_ray) else { return false };
+    let hits = lanes.intersect(block, &query.triangle_ray);
     let mut mask = hits.mask;
     while mask != 0 {
         let lane = mask.trailing_zeros() as usize;

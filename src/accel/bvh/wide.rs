@@ -61,7 +61,13 @@ impl Child {
 
     #[inline(always)]
     pub fn is_node(self) -> bool {
-        self.0 >> 30 == 0
+        self.tag() == 0
+    }
+
+    /// 0 for a node, 1 for triangles, 2 for other items, 3 for [`LEAVE`](Self::LEAVE).
+    #[inline(always)]
+    pub fn tag(self) -> usize {
+        (self.0 >> 30) as usize
     }
 
     /// The index of an inner node.
@@ -74,6 +80,12 @@ impl Child {
     #[inline(always)]
     pub fn first(self) -> usize {
         (self.0 & ((1 << Self::INDEX_BITS) - 1)) as usize
+    }
+
+    /// The first block or item of a leaf, and how many it has.
+    #[inline(always)]
+    pub fn run_of_items(self) -> (usize, usize) {
+        (self.first(), (self.0 >> Self::INDEX_BITS & Self::MAX_COUNT) as usize)
     }
 
     #[inline(always)]
