@@ -1,7 +1,7 @@
 //! Interleaved traversal of the wide hierarchy: while the memory that one ray needs is on its way, others advance.
 //!
 //! Rays are prepared in rows. Then up to [`SLOTS`] are traversed at once: a round opens a node for each ray that is
-//! at one, and tests a leaf for each ray that is at one. Loops without branches compute, and others take what they found
+//! at one, and tests a leaf for each ray that is at one. Loops without branches compute, and others take what was found
 //! from memory: a branch right after a long chain of operations would be known to be wrong only at its end. What a ray
 //! needs in the next round is prefetched. A ray that meets an instance goes on in the object's hierarchy, until the
 //! entry on its stack that returns it to the world's. Answers are those of single rays, bit for bit.
